@@ -1,0 +1,32 @@
+# roxel_module(NAME SOURCES a.cc ... [PUBLIC lib ...] [PRIVATE lib ...] [TESTS a_test.cc ...] [TEST_LIBS lib ...])
+#
+# One folder, one concept, one target: roxel_NAME (alias roxel::NAME), and NAME_test from the *_test.cc
+# files beside the sources.
+add_library(roxel_flags INTERFACE)
+target_compile_options(roxel_flags INTERFACE
+  $<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;-Wno-sign-compare;-fno-math-errno;-fno-trapping-math>)
+if(ROXEL_SANITIZE)
+  target_compile_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE})
+endif()
+install(TARGETS roxel_flags EXPORT roxelTargets)
+
+function(roxel_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS" ${ARGN})
+  add_library(roxel_${name} ${ARG_SOURCES})
+  add_library(roxel::${name} ALIAS roxel_${name})
+  set_target_properties(roxel_${name} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(roxel_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(roxel_${name} PUBLIC cxx_std_20)
+  target_link_libraries(roxel_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:roxel_flags>)
+  install(TARGETS roxel_${name} EXPORT roxelTargets)
+  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/roxel/${name}
+          FILES_MATCHING PATTERN "*.h")
+  if(ROXEL_BUILD_TESTS AND ARG_TESTS)
+    add_executable(${name}_test ${ARG_TESTS})
+    target_link_libraries(${name}_test PRIVATE roxel_${name} ${ARG_TEST_LIBS} roxel_flags
+                          GTest::gmock GTest::gtest_main rapidcheck_gtest)
+    gtest_discover_tests(${name}_test DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 300)
+  endif()
+endfunction()

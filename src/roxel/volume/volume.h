@@ -1,0 +1,163 @@
+#pragma once
+/// The sparse voxel volume: which voxels exist (Topology, an OpenVDB tree inside), where they are in the
+/// channel arrays (BrickIndex), and what they hold (channels: plain arrays, one slot a voxel).
+///
+/// The world is covered by nested lattices. Lattice 0 is the box that is reconstructed. Lattice k >= 1 is
+/// surround: twice the extent of lattice k-1 about the same centre, voxels twice as large, and empty inside
+/// lattice k-1's box.
+///
+///     +---------------------------+
+///     |  lattice 2 (4 s)          |      slots:  [ lattice 0 | lattice 1 | lattice 2 | ... ]
+///     |   +-------------------+   |      within a lattice: brick after brick (x fastest),
+///     |   | lattice 1 (2 s)   |   |      within a brick: voxel after voxel (x fastest)
+///     |   |   +-----------+   |   |
+///     |   |   | lattice 0 |   |   |
+///     |   |   +-----------+   |   |
+///     |   +-------------------+   |
+///     +---------------------------+
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <bitset>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+namespace roxel {
+
+inline constexpr int kBrickSide = 8;
+inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;
+inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
+inline constexpr std::uint16_t kNoVoxel = 0xffffu;
+
+/// Index of a voxel within its brick: x fastest; i, j, k in [0, 8).
+inline int voxel_in_brick(int i, int j, int k) { return i + kBrickSide * (j + kBrickSide * k); }
+
+/// A box of bricks in the world. Voxel (i, j, k) covers origin + voxel_size * [i, i+1) x [j, j+1) x [k, k+1).
+struct LatticeFrame {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  double voxel_size = 1;
+  Eigen::Vector3i size_in_bricks = Eigen::Vector3i::Zero();
+
+  Eigen::Vector3i size_in_voxels() const { return kBrickSide * size_in_bricks; }
+  Eigen::AlignedBox3d box() const;
+  Eigen::Vector3d voxel_centre(const Eigen::Vector3i& ijk) const {
+    return origin + voxel_size * (ijk.cast<double>() + Eigen::Vector3d::Constant(0.5));
+  }
+};
+
+/// The voxels of one brick: bit voxel_in_brick(i, j, k).
+using BrickMask = std::bitset<kBrickVoxels>;
+
+/// Which voxels of a lattice exist. Copyable value; edits keep to the frame's box.
+class Topology {
+ public:
+  explicit Topology(const LatticeFrame& frame);
+  Topology(const Topology&);
+  Topology(Topology&&) noexcept;
+  Topology& operator=(const Topology&);
+  Topology& operator=(Topology&&) noexcept;
+  ~Topology();
+
+  const LatticeFrame& frame() const { return frame_; }
+  std::int64_t voxel_count() const;
+  bool contains(const Eigen::Vector3i& ijk) const;
+  void insert(const Eigen::Vector3i& ijk);
+
+  /// Adds the set bits of a brick's mask.
+  void insert_brick(const Eigen::Vector3i& brick, const BrickMask& mask);
+  /// Removes the set bits of a brick's mask.
+  void erase_brick(const Eigen::Vector3i& brick, const BrickMask& mask);
+  /// Adds all voxels within `voxels` steps over faces, edges and corners, clipped to the box.
+  void dilate(int voxels);
+  /// Removes all voxels whose centre is inside `box` (world): keeps surround out of the lattice within.
+  void erase_inside(const Eigen::AlignedBox3d& box);
+  /// The same voxels divided into eight: a lattice of half the voxel size and twice the bricks a side.
+  Topology subdivided() const;
+
+  /// Calls visit(brick, mask) for every brick that has voxels, x fastest, then y, then z.
+  void for_each_brick(const std::function<void(const Eigen::Vector3i&, const BrickMask&)>& visit) const;
+
+ private:
+  struct Tree;
+  LatticeFrame frame_;
+  std::unique_ptr<Tree> tree_;
+};
+
+/// One brick of the compiled index. `local[v]` is kNoVoxel, or the voxel's slot minus first_slot.
+struct Brick {
+  Eigen::Vector3i coord;  ///< in bricks
+  std::uint32_t first_slot;
+  std::uint32_t count;
+  std::array<std::uint16_t, kBrickVoxels> local;
+};
+
+/// A topology compiled for the march: two array reads from a voxel to its slot.
+class BrickIndex {
+ public:
+  BrickIndex() = default;
+  /// Slots are handed out from first_slot on, brick by brick (x fastest), voxel by voxel (x fastest).
+  BrickIndex(const Topology& topology, std::uint32_t first_slot);
+
+  const LatticeFrame& frame() const { return frame_; }
+  std::uint32_t first_slot() const { return first_slot_; }
+  std::uint32_t slot_count() const { return slot_count_; }
+  const std::vector<Brick>& bricks() const { return bricks_; }
+  /// Index into bricks(), or -1; (bx, by, bz) must be inside the frame.
+  std::int32_t brick_at(int bx, int by, int bz) const {
+    return table_[bx + static_cast<std::size_t>(frame_.size_in_bricks.x()) *
+                           (by + static_cast<std::size_t>(frame_.size_in_bricks.y()) * bz)];
+  }
+  const std::int32_t* table() const { return table_.data(); }
+  /// The slot of voxel ijk, or kNoSlot where there is none or ijk is outside the frame.
+  std::uint32_t slot(const Eigen::Vector3i& ijk) const;
+
+ private:
+  LatticeFrame frame_;
+  std::uint32_t first_slot_ = 0;
+  std::uint32_t slot_count_ = 0;
+  std::vector<std::int32_t> table_;
+  std::vector<Brick> bricks_;
+};
+
+/// The frames of a volume: the box's lattice and `surround_count` lattices around it. The box is `bounds` grown
+/// to whole bricks (multiples of 4 bricks a side when there is surround, so that lattices nest on brick planes).
+std::vector<LatticeFrame> nested_frames(const Eigen::AlignedBox3d& bounds, double voxel_size, int surround_count);
+
+/// Topologies, their compiled indices and the channels that persist between passes. Slots of all lattices
+/// share one range, [0, slot_count()).
+class Volume {
+ public:
+  Volume() = default;
+  explicit Volume(std::vector<Topology> lattices);
+
+  int lattice_count() const { return static_cast<int>(topologies_.size()); }
+  const Topology& topology(int lattice) const { return topologies_[lattice]; }
+  const BrickIndex& index(int lattice) const { return indices_[lattice]; }
+  std::uint32_t slot_count() const { return slot_count_; }
+  /// Slots of lattice 0, the reconstructed box: [0, box_slot_count()).
+  std::uint32_t box_slot_count() const;
+
+  // Channels, one entry a slot, all sized slot_count():
+  std::vector<float> tau;              ///< optical depth over one voxel length, >= 0
+  std::vector<float> confidence;       ///< n / (n + 2), in [0, 1)
+  std::vector<float> color_weight;     ///< summed weight of the colour, w
+  std::vector<std::array<float, 3>> color_mean;  ///< in the matching colour space
+  std::vector<std::array<float, 6>> color_cov;   ///< xx, yy, zz, xy, xz, yz
+  std::vector<std::array<float, 2>> support;     ///< evidence of the last opacity pass: sum r, and exposure (denominator)
+
+  void resize_channels();
+
+ private:
+  std::vector<Topology> topologies_;
+  std::vector<BrickIndex> indices_;
+  std::uint32_t slot_count_ = 0;
+};
+
+/// Opacity over one voxel length from optical depth, and back; alpha in [0, 1).
+float alpha_from_tau(float tau);
+float tau_from_alpha(float alpha);
+
+}  // namespace roxel
