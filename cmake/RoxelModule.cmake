@@ -13,7 +13,7 @@ install(TARGETS roxel_flags EXPORT roxelTargets)
 
 function(roxel_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS" ${ARGN})
-  add_library(roxel_${name} ${ARG_SOURCES})
+  add_library(roxel_${name} STATIC ${ARG_SOURCES})
   add_library(roxel::${name} ALIAS roxel_${name})
   set_target_properties(roxel_${name} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(roxel_${name} PUBLIC
