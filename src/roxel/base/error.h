@@ -1,5 +1,6 @@
 #pragma once
-/// Errors by cause. The command line maps InvalidInput to exit code 2, Cancelled to 130, everything else to 1.
+/// Errors by cause. The command line maps InvalidInput to exit code 2, Cancelled to 130, everything else
+/// to 1.
 
 #include <sstream>
 #include <stdexcept>
@@ -50,15 +51,15 @@ std::string both_values(const A& a, const B& b) {
 }  // namespace roxel
 
 /// Preconditions of the library. They throw std::logic_error with both values and never abort the host.
-#define ROXEL_CHECK(condition)                                                                    \
-  do {                                                                                            \
+#define ROXEL_CHECK(condition)                                                                   \
+  do {                                                                                           \
     if (!(condition)) ::roxel::internal::throw_check_failed(__FILE__, __LINE__, #condition, ""); \
   } while (false)
-#define ROXEL_CHECK_OP(a, op, b)                                                                      \
-  do {                                                                                                \
-    if (!((a)op(b)))                                                                                  \
-      ::roxel::internal::throw_check_failed(__FILE__, __LINE__, #a " " #op " " #b,                    \
-                                            ::roxel::internal::both_values((a), (b)));                \
+#define ROXEL_CHECK_OP(a, op, b)                                                       \
+  do {                                                                                 \
+    if (!((a)op(b)))                                                                   \
+      ::roxel::internal::throw_check_failed(__FILE__, __LINE__, #a " " #op " " #b,     \
+                                            ::roxel::internal::both_values((a), (b))); \
   } while (false)
 #define ROXEL_CHECK_EQ(a, b) ROXEL_CHECK_OP(a, ==, b)
 #define ROXEL_CHECK_LT(a, b) ROXEL_CHECK_OP(a, <, b)

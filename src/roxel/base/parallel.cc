@@ -10,8 +10,7 @@
 
 namespace roxel {
 
-void parallel_for(std::int64_t count, int threads,
-                  const std::function<void(std::int64_t, int)>& body) {
+void parallel_for(std::int64_t count, int threads, const std::function<void(std::int64_t, int)>& body) {
   const int workers = static_cast<int>(std::clamp<std::int64_t>(count, 1, std::max(1, threads)));
   if (workers == 1) {
     for (std::int64_t i = 0; i < count; ++i) body(i, 0);

@@ -10,10 +10,10 @@ namespace roxel {
 
 /// Where a computation stands. `fraction` is of the whole command, monotone from 0 to 1.
 struct Progress {
-  std::string stage;     ///< e.g. "volume", "depth"
-  int level = 0;         ///< 1-based; 0 where levels mean nothing
+  std::string stage;  ///< e.g. "volume", "depth"
+  int level = 0;      ///< 1-based; 0 where levels mean nothing
   int level_count = 0;
-  int pass = 0;          ///< 1-based; 0 where passes mean nothing
+  int pass = 0;  ///< 1-based; 0 where passes mean nothing
   int pass_limit = 0;
   double fraction = 0;
 };
