@@ -122,9 +122,11 @@ class BrickIndex {
   std::vector<Brick> bricks_;
 };
 
-/// The frames of a volume: the box's lattice and `surround_count` lattices around it. The box is `bounds` grown
-/// to whole bricks (multiples of 4 bricks a side when there is surround, so that lattices nest on brick planes).
-std::vector<LatticeFrame> nested_frames(const Eigen::AlignedBox3d& bounds, double voxel_size, int surround_count);
+/// The frames of a volume: the box's lattice and `surround_count` lattices around it. The box is `bounds`
+/// grown to whole bricks (multiples of 4 bricks a side when there is surround, so that lattices nest on brick
+/// planes).
+std::vector<LatticeFrame> nested_frames(const Eigen::AlignedBox3d& bounds, double voxel_size,
+                                        int surround_count);
 
 /// Topologies, their compiled indices and the channels that persist between passes. Slots of all lattices
 /// share one range, [0, slot_count()).
@@ -141,12 +143,13 @@ class Volume {
   std::uint32_t box_slot_count() const;
 
   // Channels, one entry a slot, all sized slot_count():
-  std::vector<float> tau;              ///< optical depth over one voxel length, >= 0
-  std::vector<float> confidence;       ///< n / (n + 2), in [0, 1)
-  std::vector<float> color_weight;     ///< summed weight of the colour, w
+  std::vector<float> tau;                        ///< optical depth over one voxel length, >= 0
+  std::vector<float> confidence;                 ///< n / (n + 2), in [0, 1)
+  std::vector<float> color_weight;               ///< summed weight of the colour, w
   std::vector<std::array<float, 3>> color_mean;  ///< in the matching colour space
   std::vector<std::array<float, 6>> color_cov;   ///< xx, yy, zz, xy, xz, yz
-  std::vector<std::array<float, 2>> support;     ///< evidence of the last opacity pass: sum r, and exposure (denominator)
+  std::vector<std::array<float, 2>>
+      support;  ///< evidence of the last opacity pass: sum r, and exposure (denominator)
 
   void resize_channels();
 

@@ -1,0 +1,126 @@
+#include "roxel/volume/volume.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "roxel/base/error.h"
+
+namespace roxel {
+namespace {
+
+// The brick table of a lattice is dense, 4 bytes a brick: 1 GiB is where a voxel size is taken for a mistake.
+constexpr double kMaxBricks = 1 << 28;
+
+// exp(-16) is 1e-7, the last opacity below 1 that a float can tell from 1.
+constexpr float kMaxTau = 16.0f;
+
+// A side of n voxels that should be whole is not grown by rounding of its ends.
+constexpr double kWholeTolerance = 1e-6;
+
+std::string text(const Eigen::AlignedBox3d& box) {
+  std::ostringstream out;
+  out << box.min().transpose() << " to " << box.max().transpose();
+  return out.str();
+}
+
+Eigen::Vector3i bricks_to_cover(const Eigen::AlignedBox3d& bounds, double voxel_size, int multiple) {
+  const double step = voxel_size * kBrickSide * multiple;
+  const Eigen::Array3d steps = (bounds.sizes().array() / step - kWholeTolerance).ceil().max(1.0);
+  if (!(steps.prod() * multiple * multiple * multiple <= kMaxBricks)) {
+    std::ostringstream found;
+    found << "voxel size " << voxel_size << " in bounds " << text(bounds);
+    throw_invalid("volume", found.str(),
+                  "at most 2^28 bricks of 8^3 voxels; use larger voxels or a smaller box");
+  }
+  return multiple * steps.cast<int>();
+}
+
+void check_bounds(const Eigen::AlignedBox3d& bounds, double voxel_size) {
+  if (!(std::isfinite(voxel_size) && voxel_size > 0))
+    throw_invalid("volume", "voxel size " + std::to_string(voxel_size), "a positive number");
+  const bool finite = bounds.min().allFinite() && bounds.max().allFinite();
+  if (!finite || !(bounds.sizes().array() > 0).all())
+    throw_invalid("volume", "bounds " + text(bounds), "finite numbers, each minimum below its maximum");
+}
+
+}  // namespace
+
+Eigen::AlignedBox3d LatticeFrame::box() const {
+  return {origin, origin + voxel_size * size_in_voxels().cast<double>()};
+}
+
+BrickIndex::BrickIndex(const Topology& topology, std::uint32_t first_slot)
+    : frame_(topology.frame()), first_slot_(first_slot) {
+  const std::int64_t voxels = topology.voxel_count();
+  if (voxels >= static_cast<std::int64_t>(kNoSlot) - first_slot)
+    throw_invalid("volume", std::to_string(voxels) + " voxels", "fewer than 2^32 in all lattices");
+  const Eigen::Vector3i n = frame_.size_in_bricks;
+  table_.assign(static_cast<std::size_t>(n.x()) * n.y() * n.z(), -1);
+  topology.for_each_brick([&](const Eigen::Vector3i& coord, const BrickMask& mask) {
+    table_[coord.x() +
+           static_cast<std::size_t>(n.x()) * (coord.y() + static_cast<std::size_t>(n.y()) * coord.z())] =
+        static_cast<std::int32_t>(bricks_.size());
+    Brick& brick = bricks_.emplace_back();
+    brick.coord = coord;
+    brick.first_slot = first_slot_ + slot_count_;
+    brick.local.fill(kNoVoxel);
+    std::uint16_t local = 0;
+    for (auto v = mask._Find_first(); v < mask.size(); v = mask._Find_next(v)) brick.local[v] = local++;
+    brick.count = local;
+    slot_count_ += local;
+  });
+}
+
+std::uint32_t BrickIndex::slot(const Eigen::Vector3i& ijk) const {
+  if ((ijk.array() < 0).any() || (ijk.array() >= frame_.size_in_voxels().array()).any()) return kNoSlot;
+  const std::int32_t brick_idx = brick_at(ijk.x() / kBrickSide, ijk.y() / kBrickSide, ijk.z() / kBrickSide);
+  if (brick_idx < 0) return kNoSlot;
+  const Brick& brick = bricks_[brick_idx];
+  const std::uint16_t local =
+      brick.local[voxel_in_brick(ijk.x() % kBrickSide, ijk.y() % kBrickSide, ijk.z() % kBrickSide)];
+  return local == kNoVoxel ? kNoSlot : brick.first_slot + local;
+}
+
+std::vector<LatticeFrame> nested_frames(const Eigen::AlignedBox3d& bounds, double voxel_size,
+                                        int surround_count) {
+  check_bounds(bounds, voxel_size);
+  // Lattice k-1 takes the middle half of lattice k, so it starts a quarter of the side inside it: on a brick
+  // plane where the side is a multiple of 4 bricks.
+  const Eigen::Vector3i size = bricks_to_cover(bounds, voxel_size, surround_count > 0 ? 4 : 1);
+  const Eigen::Vector3d half_side = 0.5 * voxel_size * kBrickSide * size.cast<double>();
+  const Eigen::Vector3d first_origin = bounds.center() - half_side;
+  std::vector<LatticeFrame> frames;
+  for (int k = 0; k <= surround_count; ++k)
+    frames.push_back(
+        {first_origin - (std::ldexp(1.0, k) - 1.0) * half_side, std::ldexp(voxel_size, k), size});
+  return frames;
+}
+
+Volume::Volume(std::vector<Topology> lattices) : topologies_(std::move(lattices)) {
+  indices_.reserve(topologies_.size());
+  for (const Topology& topology : topologies_) {
+    indices_.emplace_back(topology, slot_count_);
+    slot_count_ += indices_.back().slot_count();
+  }
+  resize_channels();
+}
+
+std::uint32_t Volume::box_slot_count() const { return indices_.empty() ? 0 : indices_.front().slot_count(); }
+
+void Volume::resize_channels() {
+  tau.resize(slot_count_);
+  confidence.resize(slot_count_);
+  color_weight.resize(slot_count_);
+  color_mean.resize(slot_count_);
+  color_cov.resize(slot_count_);
+  support.resize(slot_count_);
+}
+
+float alpha_from_tau(float tau) { return -std::expm1(-std::clamp(tau, 0.0f, kMaxTau)); }
+
+float tau_from_alpha(float alpha) {
+  return alpha >= 1.0f ? kMaxTau : std::clamp(-std::log1p(-alpha), 0.0f, kMaxTau);
+}
+
+}  // namespace roxel
