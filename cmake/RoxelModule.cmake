@@ -22,11 +22,12 @@ function(roxel_module name)
   target_link_libraries(roxel_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:roxel_flags>)
   install(TARGETS roxel_${name} EXPORT roxelTargets)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/roxel/${name}
-          FILES_MATCHING PATTERN "*.h")
+          FILES_MATCHING PATTERN "*.h" PATTERN "test_data.h" EXCLUDE)
   if(ROXEL_BUILD_TESTS AND ARG_TESTS)
     add_executable(${name}_test ${ARG_TESTS})
     target_link_libraries(${name}_test PRIVATE roxel_${name} ${ARG_TEST_LIBS} roxel_flags
                           GTest::gmock GTest::gtest_main rapidcheck_gtest)
+    target_compile_definitions(${name}_test PRIVATE ROXEL_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     gtest_discover_tests(${name}_test DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 300)
   endif()
 endfunction()

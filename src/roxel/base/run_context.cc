@@ -6,6 +6,15 @@
 #include "roxel/base/error.h"
 
 namespace roxel {
+namespace {
+
+/// Lets the next report in, also when the listener throws.
+struct Release {
+  std::atomic_flag& busy;
+  ~Release() { busy.clear(std::memory_order_release); }
+};
+
+}  // namespace
 
 RunContext::RunContext(int thread_count, Listener listener)
     : thread_count_(thread_count > 0 ? thread_count : std::max(1u, std::thread::hardware_concurrency())),
@@ -18,10 +27,12 @@ void RunContext::throw_if_cancelled() const {
 void RunContext::report(Progress progress) {
   if (!listener_) return;
   while (busy_.test_and_set(std::memory_order_acquire)) std::this_thread::yield();
-  progress.fraction = std::clamp(progress.fraction, highest_.load(), 1.0);
+  const Release release{busy_};
+  // Written so that NaN, too, becomes the highest fraction so far.
+  if (!(progress.fraction >= highest_)) progress.fraction = highest_;
+  progress.fraction = std::min(progress.fraction, 1.0);
   highest_ = progress.fraction;
   listener_(progress);
-  busy_.clear(std::memory_order_release);
 }
 
 }  // namespace roxel

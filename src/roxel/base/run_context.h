@@ -35,14 +35,15 @@ class RunContext {
   /// Throws Cancelled after cancel() was called. Cheap: call it once per image row or brick.
   void throw_if_cancelled() const;
 
-  /// Passes `progress` to the listener; a fraction below an earlier one is raised to it.
+  /// Passes `progress` to the listener; a fraction below an earlier one (or NaN) is raised to it. The
+  /// listener must not report itself.
   void report(Progress progress);
 
  private:
   int thread_count_;
   Listener listener_;
   std::atomic<bool> cancelled_{false};
-  std::atomic<double> highest_{0};
+  double highest_ = 0;  ///< guarded by busy_
   std::atomic_flag busy_ = ATOMIC_FLAG_INIT;
 };
 
