@@ -44,8 +44,10 @@ struct Dataset {
   std::vector<View> views;
   std::vector<Node> nodes;
   std::vector<Eigen::Vector3d> points;                ///< sparse points, world; may be empty
+  std::vector<int> point_view_counts;                 ///< views that see each point; empty where unknown
   std::optional<Eigen::AlignedBox3d> scene_bounds;    ///< where the data set itself states them
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings;  ///< what may spoil the result and what to do about it
+  std::vector<std::string> notes;     ///< what was chosen where the data set leaves a choice
 };
 
 /// A view's pixels after response, undistortion and masks.
@@ -59,7 +61,8 @@ struct Photograph {
 using PhotographLoader = std::function<Photograph(const View&)>;
 
 /// Groups views into nodes: by node_id where given, otherwise by optical centres within `tolerance` (world
-/// units); negative tolerance = 1e-6 of the largest distance between centres. Fills nodes and node_idx.
+/// units; chains of close centres join); negative tolerance = 1e-6 of the largest distance between centres.
+/// Fills nodes (given ids first, ascending; then in the order of the views) and node_idx.
 void assign_nodes(Dataset& dataset, double tolerance = -1);
 
 }  // namespace roxel
