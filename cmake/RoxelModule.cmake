@@ -9,7 +9,6 @@ if(ROXEL_SANITIZE)
   target_compile_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE})
 endif()
-install(TARGETS roxel_flags EXPORT roxelTargets)
 
 function(roxel_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS" ${ARGN})
