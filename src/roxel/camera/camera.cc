@@ -1,11 +1,22 @@
 #include "roxel/camera/camera.h"
 
+#include <Eigen/Geometry>
+
 namespace roxel {
 
 Eigen::Matrix3d Intrinsics::matrix() const {
   Eigen::Matrix3d k;
   k << fx, skew, cx, 0, fy, cy, 0, 0, 1;
   return k;
+}
+
+Eigen::Vector2d pixel_from_normalised(const Intrinsics& k, const Eigen::Vector2d& x) {
+  return {k.fx * x.x() + k.skew * x.y() + k.cx, k.fy * x.y() + k.cy};
+}
+
+Eigen::Vector2d normalised_from_pixel(const Intrinsics& k, const Eigen::Vector2d& pixel) {
+  const double y = (pixel.y() - k.cy) / k.fy;
+  return {(pixel.x() - k.cx - k.skew * y) / k.fx, y};
 }
 
 Eigen::Vector3d PinholeCamera::camera_from_world(const Eigen::Vector3d& x_in_world) const {
@@ -18,15 +29,13 @@ Eigen::Vector3d PinholeCamera::world_from_camera(const Eigen::Vector3d& x_in_cam
 
 Eigen::Vector3d PinholeCamera::project(const Eigen::Vector3d& x_in_world) const {
   const Eigen::Vector3d x = camera_from_world(x_in_world);
-  const double u = (intrinsics.fx * x.x() + intrinsics.skew * x.y()) / x.z() + intrinsics.cx;
-  const double v = intrinsics.fy * x.y() / x.z() + intrinsics.cy;
-  return {u, v, x.z()};
+  const Eigen::Vector2d pixel = pixel_from_normalised(intrinsics, x.head<2>() / x.z());
+  return {pixel.x(), pixel.y(), x.z()};
 }
 
 Ray PinholeCamera::ray(double u, double v) const {
-  const double y = (v - intrinsics.cy) / intrinsics.fy;
-  const double x = (u - intrinsics.cx - intrinsics.skew * y) / intrinsics.fx;
-  return {pose.centre, pose.rotation.transpose() * Eigen::Vector3d(x, y, 1)};
+  const Eigen::Vector2d x = normalised_from_pixel(intrinsics, {u, v});
+  return {pose.centre, pose.rotation.transpose() * x.homogeneous()};
 }
 
 }  // namespace roxel

@@ -19,6 +19,10 @@ struct Intrinsics {
   Eigen::Matrix3d matrix() const;
 };
 
+/// Pixel position K (x, y, 1) of the normalised position (x/z, y/z), and its inverse.
+Eigen::Vector2d pixel_from_normalised(const Intrinsics& intrinsics, const Eigen::Vector2d& x_normalised);
+Eigen::Vector2d normalised_from_pixel(const Intrinsics& intrinsics, const Eigen::Vector2d& pixel);
+
 /// x_in_camera = rotation * (x_in_world - centre); rotation is camera_from_world, orthonormal, det +1.
 struct Pose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
