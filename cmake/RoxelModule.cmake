@@ -1,14 +1,19 @@
 # roxel_module(NAME SOURCES a.cc ... [PUBLIC lib ...] [PRIVATE lib ...] [TESTS a_test.cc ...] [TEST_LIBS lib ...])
 #
 # One folder, one concept, one target: roxel_NAME (alias roxel::NAME), and NAME_test from the *_test.cc
-# files beside the sources.
+# files beside the sources. Tests carry the module's name as label: ctest -L NAME.
 add_library(roxel_flags INTERFACE)
 target_compile_options(roxel_flags INTERFACE
-  $<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;-Wno-sign-compare;-fno-math-errno;-fno-trapping-math>)
+  -Wall -Wextra -Wshadow -Wno-sign-compare -fno-math-errno -fno-trapping-math)
 if(ROXEL_SANITIZE)
   target_compile_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE})
 endif()
+
+# Modules whose tests are quick enough to be run under sanitizers on every change (.ci/run):
+# cmake --build --preset asan --target sanitizer_tests && ctest --preset asan -L sanitizer
+set(ROXEL_SANITIZER_MODULES base color camera image volume dataset march infer)
+add_custom_target(sanitizer_tests)
 
 function(roxel_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS" ${ARGN})
@@ -23,10 +28,19 @@ function(roxel_module name)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/roxel/${name}
           FILES_MATCHING PATTERN "*.h" PATTERN "test_data.h" EXCLUDE)
   if(ROXEL_BUILD_TESTS AND ARG_TESTS)
-    add_executable(${name}_test ${ARG_TESTS})
-    target_link_libraries(${name}_test PRIVATE roxel_${name} ${ARG_TEST_LIBS} roxel_flags
-                          GTest::gmock GTest::gtest_main rapidcheck_gtest)
-    target_compile_definitions(${name}_test PRIVATE ROXEL_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-    gtest_discover_tests(${name}_test DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 300)
+    roxel_module_test(${name} "${ARG_TESTS}" "${ARG_TEST_LIBS}")
   endif()
+endfunction()
+
+function(roxel_module_test name sources libraries)
+  add_executable(${name}_test ${sources})
+  target_link_libraries(${name}_test PRIVATE roxel_${name} ${libraries} roxel_flags
+                        GTest::gmock GTest::gtest_main rapidcheck_gtest)
+  target_compile_definitions(${name}_test PRIVATE ROXEL_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  set(label ${name})
+  if(name IN_LIST ROXEL_SANITIZER_MODULES)
+    add_dependencies(sanitizer_tests ${name}_test)
+    set(label sanitizer.${name})
+  endif()
+  gtest_discover_tests(${name}_test DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 300 LABELS ${label})
 endfunction()

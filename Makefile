@@ -1,0 +1,44 @@
+# Thin wrappers; the work is done by CMake (see CMakePresets.json) and tools/.
+#
+#   make test     build everything and run all tests
+#   make demo     build, reconstruct a small synthetic world, say where the pictures are
+#   make build    build everything
+#   make bench    build and run the benchmarks
+#   make format   format the sources
+#
+# PRESET=dev|release|asan|tsan picks the build (folder build/PRESET); JOBS=N limits parallel jobs.
+PRESET ?= release
+JOBS ?= $(shell nproc)
+export ROXEL_COMPILER_LAUNCHER ?= $(shell command -v ccache)
+
+.PHONY: all setup configure build test demo bench format clean
+all: build
+
+setup:
+	@tools/setup.sh
+
+configure: setup
+	cmake --preset $(PRESET)
+
+build: configure
+	cmake --build --preset $(PRESET) -j $(JOBS)
+
+test: build
+	ctest --preset $(PRESET) -j $(JOBS)
+
+demo: configure
+	cmake --build --preset $(PRESET) -j $(JOBS) --target roxel
+	tools/demo.sh build/$(PRESET)/apps/roxel/roxel
+
+bench:
+	tools/setup.sh dev
+	cmake --preset $(PRESET) -DROXEL_BUILD_BENCHMARKS=ON
+	cmake --build --preset $(PRESET) -j $(JOBS)
+	tools/bench.sh build/$(PRESET)
+
+format:
+	tools/setup.sh dev
+	tools/format.sh
+
+clean:
+	rm -rf build/$(PRESET)
