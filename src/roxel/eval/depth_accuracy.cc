@@ -1,0 +1,140 @@
+#include "roxel/eval/depth_accuracy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "roxel/base/error.h"
+
+namespace roxel {
+namespace {
+
+double share(std::int64_t part, std::int64_t whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+void check(const DepthEstimate& estimate, std::span<const float> truth, const DepthAccuracyOptions& options) {
+  ROXEL_CHECK_EQ(estimate.depth.size(), truth.size());
+  if (!estimate.variance.empty()) ROXEL_CHECK_EQ(estimate.variance.size(), truth.size());
+  if (!estimate.opacity.empty()) ROXEL_CHECK_EQ(estimate.opacity.size(), truth.size());
+  ROXEL_CHECK(options.voxel_size > 0);
+  ROXEL_CHECK(!options.thresholds.empty());
+  ROXEL_CHECK(std::is_sorted(options.thresholds.begin(), options.thresholds.end()));
+}
+
+/// Errors are compared in doubles; a float depth carries 6e-8, far below any voxel.
+void count_found(DepthAccuracy& sums, double error_voxels, double sigma_voxels) {
+  ++sums.found_pixels;
+  const double distance = std::abs(error_voxels);
+  for (std::size_t i = 0; i < sums.thresholds.size(); ++i) sums.within[i] += distance <= sums.thresholds[i];
+  if (distance <= sums.thresholds.back()) sums.signed_error_voxels += error_voxels;
+  if (!(sigma_voxels > 0)) return;
+  ++sums.calibrated_pixels;
+  const double bins = std::ceil(distance / sigma_voxels * DepthAccuracy::kBinsPerSigma) - 1;
+  const double last = static_cast<double>(sums.normalized_errors.size() - 1);
+  ++sums.normalized_errors[static_cast<std::size_t>(std::clamp(bins, 0.0, last))];
+}
+
+std::string row(const std::string& name, const DepthAccuracy& a) {
+  char cell[128];
+  std::string out = "| " + name;
+  std::snprintf(cell, sizeof cell, " | %lld", static_cast<long long>(a.true_pixels));
+  out += cell;
+  for (std::size_t i = 0; i < a.within.size(); ++i) {
+    std::snprintf(cell, sizeof cell, " | %.2f", 100 * a.share_within(i));
+    out += cell;
+  }
+  std::snprintf(cell, sizeof cell, " | %.2f | %.2f | %+.3f", 100 * a.share_found(), 100 * a.share_false(),
+                a.bias_voxels());
+  out += cell;
+  for (int k = 1; k <= 3; ++k) {
+    std::snprintf(cell, sizeof cell, " | %.1f", 100 * a.share_within_sigma(k));
+    out += cell;
+  }
+  return out + " |\n";
+}
+
+}  // namespace
+
+double DepthAccuracy::share_within(std::size_t i) const { return share(within.at(i), true_pixels); }
+double DepthAccuracy::share_found() const { return share(found_pixels, true_pixels); }
+double DepthAccuracy::share_false() const { return share(false_pixels, empty_pixels); }
+
+double DepthAccuracy::bias_voxels() const {
+  const std::int64_t count = within.empty() ? 0 : within.back();
+  return count > 0 ? signed_error_voxels / static_cast<double>(count) : 0.0;
+}
+
+double DepthAccuracy::share_within_sigma(double k) const {
+  const auto bins =
+      std::clamp<std::int64_t>(std::llround(k * kBinsPerSigma), 0, normalized_errors.size() - 1);
+  std::int64_t count = 0;
+  for (std::int64_t i = 0; i < bins; ++i) count += normalized_errors[i];
+  return share(count, calibrated_pixels);
+}
+
+double DepthAccuracy::median_normalized_error() const {
+  if (calibrated_pixels == 0) return 0;
+  std::int64_t count = 0;
+  std::size_t bin = 0;
+  while (bin + 1 < normalized_errors.size() && 2 * (count + normalized_errors[bin]) < calibrated_pixels)
+    count += normalized_errors[bin++];
+  return (static_cast<double>(bin) + 0.5) / kBinsPerSigma;
+}
+
+void DepthAccuracy::add(const DepthAccuracy& other) {
+  ROXEL_CHECK(thresholds == other.thresholds);
+  true_pixels += other.true_pixels;
+  found_pixels += other.found_pixels;
+  empty_pixels += other.empty_pixels;
+  false_pixels += other.false_pixels;
+  signed_error_voxels += other.signed_error_voxels;
+  calibrated_pixels += other.calibrated_pixels;
+  for (std::size_t i = 0; i < within.size(); ++i) within[i] += other.within[i];
+  for (std::size_t i = 0; i < normalized_errors.size(); ++i)
+    normalized_errors[i] += other.normalized_errors[i];
+}
+
+DepthAccuracy depth_accuracy(const DepthEstimate& estimate, std::span<const float> truth,
+                             const DepthAccuracyOptions& options) {
+  check(estimate, truth, options);
+  DepthAccuracy sums;
+  sums.thresholds = options.thresholds;
+  sums.within.assign(options.thresholds.size(), 0);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const float z = estimate.depth[i];
+    const float opacity = estimate.opacity.empty() ? 1.0f : estimate.opacity[i];
+    const bool has_depth = opacity > options.opacity_threshold && z > 0 && std::isfinite(z);
+    if (truth[i] == 0) {
+      ++sums.empty_pixels;
+      sums.false_pixels += has_depth;
+    } else if (truth[i] > 0 && std::isfinite(truth[i])) {
+      ++sums.true_pixels;
+      if (!has_depth) continue;
+      const double sigma = estimate.variance.empty() ? 0.0 : std::sqrt(std::max(0.0f, estimate.variance[i]));
+      count_found(sums, (static_cast<double>(z) - truth[i]) / options.voxel_size, sigma / options.voxel_size);
+    }
+  }
+  return sums;
+}
+
+std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views) {
+  if (views.empty()) return "";
+  char cell[64];
+  std::string head = "| view | pixels", rule = "|---|---:";
+  DepthAccuracy all = views.front().accuracy;
+  for (double threshold : all.thresholds) {
+    std::snprintf(cell, sizeof cell, " | within %g %%", threshold);
+    head += cell;
+    rule += "|---:";
+  }
+  std::string out = head + " | with depth % | empty given depth % | bias | in 1 sigma % | 2 | 3 |\n" + rule +
+                    "|---:|---:|---:|---:|---:|---:|\n";
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (i > 0) all.add(views[i].accuracy);
+    out += row(views[i].name, views[i].accuracy);
+  }
+  return out + row("**all**", all);
+}
+
+}  // namespace roxel
