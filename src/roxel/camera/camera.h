@@ -17,6 +17,7 @@ struct Intrinsics {
   double skew = 0;
 
   Eigen::Matrix3d matrix() const;
+  bool operator==(const Intrinsics&) const = default;
 };
 
 /// Pixel position K (x, y, 1) of the normalised position (x/z, y/z), and its inverse.

@@ -37,6 +37,8 @@ struct Lens {
   LensModel model = LensModel::kPinhole;
   Intrinsics intrinsics;
   std::array<double, 8> coefficients{};
+
+  bool operator==(const Lens&) const = default;
 };
 
 /// Number of leading coefficients that `model` reads.
