@@ -11,18 +11,19 @@ namespace roxel {
 namespace {
 
 constexpr std::size_t kFewestPoints = 20;
-constexpr int kTrustedTrack = 3;           // views that see a point before it is trusted
-constexpr double kPointPercentile = 0.01;  // cut at both ends: outliers of structure from motion
-constexpr double kPointMargin = 0.1;       // of the extent: what the percentiles and sparse sampling miss
-constexpr double kPointQuorum = 0.4;       // share of the nodes that look at what outside-in points may bound
-constexpr double kNearShare = 0.5;         // of the depth at which the box, or what is known, begins
-constexpr double kSurroundDiagonals = 3;   // how far rays go on behind the box
+constexpr int kTrustedTrack = 3;            // views that see a point before it is trusted
+constexpr double kPointPercentile = 0.005;  // cut at both ends: outliers of structure from motion
+constexpr double kPointMargin = 0.1;        // of the extent: what the percentiles and sparse sampling miss
+constexpr double kMaskedQuorum = 0.25;      // share of the nodes that see what the masks then tighten
+constexpr double kPointQuorum = 0.4;      // share of the nodes that look at what outside-in points may bound
+constexpr double kNearShare = 0.5;        // of the depth at which the box, or what is known, begins
+constexpr double kSurroundDiagonals = 3;  // how far rays go on behind the box
 constexpr double kInsideNearDiagonals = 1e-3;
 
 std::string describe(const std::string& prefix, std::size_t used, std::size_t all) {
   std::ostringstream out;
   out << prefix << " (" << used << " of " << all
-      << " points, 1st to 99th percentile and a margin of a tenth)";
+      << " points, 0.5th to 99.5th percentile, a margin of a tenth)";
   return out.str();
 }
 
@@ -82,6 +83,11 @@ Eigen::AlignedBox3d robust_box(const std::vector<Eigen::Vector3d>& points) {
   return {low - margin, high + margin};
 }
 
+bool has_masks(const Dataset& dataset) {
+  return std::any_of(dataset.views.begin(), dataset.views.end(),
+                     [](const View& v) { return !v.mask_path.empty(); });
+}
+
 void choose_box(const Dataset& dataset, const BoundsOptions& options, const CameraRig& rig,
                 SceneBounds& bounds) {
   if (options.box) {
@@ -104,9 +110,12 @@ void choose_box(const Dataset& dataset, const BoundsOptions& options, const Came
     throw_invalid(dataset.path + ": bounds", "no points and one optical centre for all views",
                   "bounds given by hand, sparse points, or views from several places");
   }
-  const int quorum = seeing_quorum(dataset, rig);
+  int quorum = seeing_quorum(dataset, rig);
+  if (rig.layout == CameraLayout::kOutsideIn && options.load_masks && has_masks(dataset)) {
+    quorum = std::max(2, static_cast<int>(std::ceil(kMaskedQuorum * dataset.nodes.size())));
+  }
   bounds.box = box_seen_by(dataset, rig, quorum);
-  if (bounds.box.isEmpty()) bounds.box = box_seen_by(dataset, rig, std::min<int>(2, dataset.nodes.size()));
+  if (bounds.box.isEmpty()) bounds.box = box_seen_by(dataset, rig, quorum = 2);
   if (bounds.box.isEmpty()) {
     throw_invalid(dataset.path + ": bounds", "no place that two views see", "bounds given by hand");
   }
@@ -178,6 +187,11 @@ SceneBounds default_bounds(const Dataset& dataset, const BoundsOptions& options)
   const CameraRig rig = describe_cameras(dataset);
   SceneBounds bounds;
   choose_box(dataset, options, rig, bounds);
+  const bool stated = options.box || (options.use_scene_bounds && dataset.scene_bounds);
+  if (!stated && options.load_masks && has_masks(dataset)) {
+    bounds.box = tighten_by_masks(bounds.box, dataset, options.load_masks);
+    bounds.how += ", tightened by masks";
+  }
   const std::vector<Eigen::Vector3d> points =
       options.use_points ? trusted_points(dataset) : std::vector<Eigen::Vector3d>();
   for (const View& view : dataset.views) {

@@ -18,6 +18,9 @@ struct BoundsOptions {
   std::optional<Eigen::AlignedBox3d> box;  ///< taken as it is
   bool use_scene_bounds = true;            ///< the data set's own box, where it states one
   bool use_points = true;                  ///< its sparse points, where it has enough of them
+  /// Where set, and the data set has masks, a box from points or cameras is tightened by them; a box from
+  /// cameras then starts larger, since the masks say where the object ends.
+  PhotographLoader load_masks;
 };
 
 struct DepthRange {

@@ -17,18 +17,18 @@ namespace roxel {
 
 /// One photograph: where it was taken from and where its pixels are.
 struct View {
-  std::string name;        ///< the image's path relative to the data set's image root, without its suffix
-  std::string image_path;  ///< absolute
-  std::string mask_path;   ///< absolute; empty where there is no mask file
-  std::string source;      ///< for messages: "file:line" or "file: frames[3]" that this view comes from
-  PinholeCamera camera;    ///< after undistortion; same size as the image file
-  Lens lens;               ///< of the image file, with the file's own intrinsics
-  int node_idx = -1;       ///< capture node: index into Dataset::nodes; set by assign_nodes
-  std::optional<int> node_id;            ///< `node` as given by the data set
-  std::optional<double> time_utc_s;      ///< seconds since 1970-01-01T00:00:00Z
+  std::string name;            ///< the image's path relative to the data set's image root, without its suffix
+  std::string image_path;      ///< absolute
+  std::string mask_path;       ///< absolute; empty where there is no mask file
+  std::string source;          ///< for messages: "file:line" or "file: frames[3]" that this view comes from
+  PinholeCamera camera;        ///< after undistortion; same size as the image file
+  Lens lens;                   ///< of the image file, with the file's own intrinsics
+  int node_idx = -1;           ///< capture node: index into Dataset::nodes; set by assign_nodes
+  std::optional<int> node_id;  ///< `node` as given by the data set
+  std::optional<double> time_utc_s;  ///< seconds since 1970-01-01T00:00:00Z
   std::optional<double> latitude_deg;
   std::optional<double> longitude_deg;
-  std::optional<double> near;            ///< world units along the optical axis
+  std::optional<double> near;  ///< world units along the optical axis
   std::optional<double> far;
 };
 
@@ -43,11 +43,11 @@ struct Dataset {
   std::string format;  ///< "colmap", "transforms", "middlebury", "strecha" or "krt"
   std::vector<View> views;
   std::vector<Node> nodes;
-  std::vector<Eigen::Vector3d> points;                ///< sparse points, world; may be empty
-  std::vector<int> point_view_counts;                 ///< views that see each point; empty where unknown
-  std::optional<Eigen::AlignedBox3d> scene_bounds;    ///< where the data set itself states them
-  std::vector<std::string> warnings;  ///< what may spoil the result and what to do about it
-  std::vector<std::string> notes;     ///< what was chosen where the data set leaves a choice
+  std::vector<Eigen::Vector3d> points;              ///< sparse points, world; may be empty
+  std::vector<int> point_view_counts;               ///< views that see each point; empty where unknown
+  std::optional<Eigen::AlignedBox3d> scene_bounds;  ///< where the data set itself states them
+  std::vector<std::string> warnings;                ///< what may spoil the result and what to do about it
+  std::vector<std::string> notes;                   ///< what was chosen where the data set leaves a choice
 };
 
 /// A view's pixels after response, undistortion and masks.

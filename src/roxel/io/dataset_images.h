@@ -1,0 +1,21 @@
+#pragma once
+/// What can be said about an image file without decoding its pixels.
+
+#include <filesystem>
+#include <string>
+
+namespace roxel {
+
+struct ImageSize {
+  int width = 0;
+  int height = 0;
+};
+
+/// Size from the file's header. Throws InvalidInput, naming the file and `source` (who refers to it), where
+/// it is missing, has 0 bytes, is no image, or (PNG, JPEG) stops before its end.
+ImageSize checked_image_size(const std::filesystem::path& file, const std::string& source);
+
+/// Whether a PNG's chunks or a JPEG's data reach their end mark; true for every other kind of file.
+bool reaches_end_mark(const std::filesystem::path& file);
+
+}  // namespace roxel
