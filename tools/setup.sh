@@ -7,9 +7,10 @@
 set -eu
 
 build="g++ cmake ninja-build python3
-  libopenvdb-dev libboost-iostreams-dev libtbb-dev libeigen3-dev libopenimageio-dev
+  libopenvdb-dev libboost-iostreams-dev zlib1g-dev libtbb-dev libeigen3-dev
+  libopenimageio-dev openimageio-tools
   nlohmann-json3-dev libcli11-dev libgtest-dev libgmock-dev librapidcheck-dev"
-dev="clang-format clang-tidy ccache libbenchmark-dev libopenvdb-tools openimageio-tools"
+dev="clang-format clang-tidy ccache libbenchmark-dev libopenvdb-tools"
 
 wanted=$build
 if [ "${1:-}" = dev ]; then wanted="$build $dev"; fi
