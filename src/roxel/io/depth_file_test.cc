@@ -75,8 +75,7 @@ TEST_F(DepthFileTest, RefusesWhatIsNoDepthFile) {
               testing::AllOf(HasSubstr("missing.exr"), HasSubstr("no such file")));
   fs::create_directories(run_);
   std::ofstream(run_ / "empty.exr") << "";
-  EXPECT_THAT(refusal(run_ / "empty.exr"),
-              testing::AllOf(HasSubstr("empty.exr"), HasSubstr("channels Z, V, A")));
+  EXPECT_THAT(refusal(run_ / "empty.exr"), testing::AllOf(HasSubstr("empty.exr"), HasSubstr("0 bytes")));
   const auto file = OIIO::ImageOutput::create("a.exr");
   file->open((run_ / "rgb.exr").string(), OIIO::ImageSpec(2, 2, 3, OIIO::TypeFloat));
   file->write_image(OIIO::TypeFloat, std::vector<float>(12).data());
