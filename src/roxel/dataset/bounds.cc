@@ -85,7 +85,7 @@ Eigen::AlignedBox3d robust_box(const std::vector<Eigen::Vector3d>& points) {
 
 bool has_masks(const Dataset& dataset) {
   return std::any_of(dataset.views.begin(), dataset.views.end(),
-                     [](const View& v) { return !v.mask_path.empty(); });
+                     [](const View& v) { return !v.mask_path.empty() || v.has_alpha; });
 }
 
 void choose_box(const Dataset& dataset, const BoundsOptions& options, const CameraRig& rig,

@@ -40,9 +40,9 @@ struct SceneBounds {
 SceneBounds default_bounds(const Dataset& dataset, const BoundsOptions& options = {});
 
 /// The box that contains what is foreground in the masks (visual hull on a coarse grid): a cell stays when
-/// enough nodes see it and hardly a masked view of those sees background there. Loads every view that has a
-/// mask once. Returns `box` unchanged where no view has a foreground mask or the hull is empty; never larger
-/// than `box`.
+/// enough nodes see it and hardly a masked view of those sees background there. Loads each view
+/// that has a mask file or alpha once (at most 120 of them, evenly chosen). Returns `box` unchanged where no
+/// view has a foreground mask or the hull is empty; never larger than `box`.
 Eigen::AlignedBox3d tighten_by_masks(const Eigen::AlignedBox3d& box, const Dataset& dataset,
                                      const PhotographLoader& load);
 

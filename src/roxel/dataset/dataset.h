@@ -20,6 +20,7 @@ struct View {
   std::string name;            ///< the image's path relative to the data set's image root, without its suffix
   std::string image_path;      ///< absolute
   std::string mask_path;       ///< absolute; empty where there is no mask file
+  bool has_alpha = false;      ///< the image file has an alpha channel, which may serve as its mask
   std::string source;          ///< for messages: "file:line" or "file: frames[3]" that this view comes from
   PinholeCamera camera;        ///< after undistortion; same size as the image file
   Lens lens;                   ///< of the image file, with the file's own intrinsics

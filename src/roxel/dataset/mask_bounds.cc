@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kCells = 48;
 constexpr int kRounds = 2;
+constexpr std::size_t kMostViews = 120;  // evenly chosen: more of them tell a coarse hull little
 constexpr double kBackgroundVeto =
     0.1;                         // share of the views that may call a kept cell background (bad masks)
 constexpr double kQuorum = 0.5;  // of the most nodes that see any cell
@@ -56,7 +57,10 @@ struct MaskedView {
 
 std::vector<MaskedView> load_masks(const Dataset& dataset, const PhotographLoader& load) {
   std::vector<MaskedView> masked;
-  for (const View& view : dataset.views) {
+  const std::size_t count = dataset.views.size(), chosen = std::min(count, kMostViews);
+  for (std::size_t i = 0; i < chosen; ++i) {
+    const View& view = dataset.views[i * count / chosen];
+    if (view.mask_path.empty() && !view.has_alpha) continue;
     const Photograph photograph = load(view);
     if (!photograph.foreground.empty()) masked.push_back({&view, ForegroundSums(photograph.foreground)});
   }

@@ -276,7 +276,10 @@ Dataset read_colmap(const fs::path& path) {
     dataset.views.push_back(std::move(view));
   }
   dataset.points = std::move(model.points);
-  dataset.point_view_counts = std::move(model.point_view_counts);
+  const std::vector<int>& counts = model.point_view_counts;
+  // Tools that export bare points leave the tracks empty.
+  const bool known = std::any_of(counts.begin(), counts.end(), [](int count) { return count > 0; });
+  if (known) dataset.point_view_counts = counts;
   return dataset;
 }
 

@@ -70,7 +70,7 @@ ImageSize checked_image_size(const fs::path& file, const std::string& source) {
     throw_invalid(where, "a file that cannot be read as an image (" + escaped(reason, 200) + ")",
                   "an image that OpenImageIO reads");
   }
-  const ImageSize size{in->spec().width, in->spec().height};
+  const ImageSize size{in->spec().width, in->spec().height, in->spec().alpha_channel >= 0};
   in->close();
   if (!reaches_end_mark(file)) {
     throw_invalid(where,

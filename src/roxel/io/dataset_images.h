@@ -6,9 +6,11 @@
 
 namespace roxel {
 
+/// What the header says.
 struct ImageSize {
   int width = 0;
   int height = 0;
+  bool has_alpha = false;  ///< the file has a channel that says so
 };
 
 /// Size from the file's header. Throws InvalidInput, naming the file and `source` (who refers to it), where

@@ -168,6 +168,7 @@ void keep_images(const std::string& pattern, Dataset& dataset) {
 /// Size against the header; the pinhole after undistortion.
 void complete_camera(View& view) {
   const ImageSize size = checked_image_size(view.image_path, view.source);
+  view.has_alpha = size.has_alpha;
   Intrinsics& k = view.lens.intrinsics;
   if (k.width == 0 && k.height == 0) {
     k.width = size.width;
@@ -186,7 +187,10 @@ void complete_camera(View& view) {
 
 void find_masks(const fs::path& path, const std::string& masks, Dataset& dataset) {
   if (masks == "none") {
-    for (View& view : dataset.views) view.mask_path.clear();
+    for (View& view : dataset.views) {
+      view.mask_path.clear();
+      view.has_alpha = false;
+    }
     return;
   }
   std::vector<fs::path> folders;
@@ -207,7 +211,7 @@ void find_masks(const fs::path& path, const std::string& masks, Dataset& dataset
           mask_in_folder(folder, view.name + fs::path(view.image_path).extension().string());
       if (!found.empty()) view.mask_path = fs::absolute(found).lexically_normal().string();
     }
-    with_mask += !view.mask_path.empty();
+    with_mask += !view.mask_path.empty() || view.has_alpha;
   }
   const std::string share = std::to_string(with_mask) + " of " + std::to_string(dataset.views.size());
   if (masks != "auto" && with_mask == 0)
