@@ -118,7 +118,7 @@ class Archive {
  public:
   explicit Archive(const std::filesystem::path& path) : path_(path) {
     if (!std::filesystem::is_regular_file(path)) refuse("no such file");
-    // With exceptions on, OpenVDB, which does not check its stream, stops where the file does.
+    // With exceptions on, reading stops where the file does, whatever OpenVDB itself checks.
     std::ifstream file(path, std::ios::binary);
     if (!file) refuse("a file that cannot be opened");
     try {
