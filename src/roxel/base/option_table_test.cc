@@ -195,6 +195,8 @@ TEST(OptionTable, RejectsTextAndNamesFieldValueAndRange) {
       {"point", "1,2", "3 numbers in [-10, 10]"},
       {"point", "1,2,3,4", "3 numbers in [-10, 10]"},
       {"point", "1,,3", "3 numbers in [-10, 10]"},
+      {"point", "1,,2,3", "3 numbers in [-10, 10]"},
+      {"point", "1,2,3,", "3 numbers in [-10, 10]"},
       {"point", "1,2,11", "3 numbers in [-10, 10]"},
       {"point", "1,2,nan", "3 numbers in [-10, 10]"},
       {"point", "1 2 3", "3 numbers in [-10, 10]"},
@@ -218,6 +220,7 @@ TEST(OptionTable, SaysWhatAnUnknownNameMayHaveMeant) {
   };
   EXPECT_EQ(message("voxel-szie"), "--voxel-szie: found an unknown option, expected perhaps voxel-size");
   EXPECT_THAT(message("voxel"), HasSubstr("perhaps voxel-size"));
+  EXPECT_THAT(message("ovxel-szie"), HasSubstr("perhaps voxel-size"));
   EXPECT_THAT(message("pases"), HasSubstr("perhaps passes"));
   EXPECT_THAT(message("no-levels"), HasSubstr("unknown option"));
   EXPECT_THAT(message("qqqqqqqqqqqq"), AllOf(HasSubstr("unknown option"), Not(HasSubstr("perhaps"))));
@@ -248,6 +251,7 @@ TEST(OptionTable, RejectsJsonAndLeavesTheOptionsAlone) {
       {R"({"levels": 99})", "config.json: \"levels\": found 99, expected"},
       {R"({"levels": null})", "config.json: \"levels\": found null, expected"},
       {R"({"seed": 18446744073709551615})", "\"seed\": found 18446744073709551615, expected"},
+      {R"({"limit": 18446744073709551615})", "\"limit\": found 18446744073709551615, expected"},
       {R"({"levels": 2, "voxel-size": -1})", "\"voxel-size\": found -1, expected a number > 0"},
       {R"({"voxel-size": true})", "\"voxel-size\": found true, expected a number > 0"},
       {R"({"adaptive": 1})", "\"adaptive\": found 1, expected true or false"},
@@ -373,6 +377,16 @@ TEST(OptionTable, RefusesANameTwice) {
   OptionTable<PassOptions> table;
   table.add("passes", &PassOptions::passes);
   EXPECT_THROW(table.add("passes", &PassOptions::passes), std::logic_error);
+}
+
+TEST(OptionTable, AChoiceMayBeCalledAuto) {
+  OptionTable<Options> table;
+  table.add("update", &Options::update, {{"auto", Update::kRoxels}, {"posterior", Update::kPosterior}});
+  Options from_text, from_json;
+  table.set(from_text, "update", "auto");
+  table.apply_json(from_json, json::parse(R"({"update": "auto"})"), "config.json");
+  EXPECT_EQ(from_text.update, Update::kRoxels);
+  EXPECT_EQ(from_json.update, Update::kRoxels);
 }
 
 TEST(OptionTable, BindsThroughACallable) {
