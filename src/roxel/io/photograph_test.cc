@@ -142,7 +142,8 @@ TEST_F(LoadPhotograph, PixelsThatAreNotFiniteAreInvalid) {
   EXPECT_EQ(photograph.valid.at(7, 9), 0);
   EXPECT_EQ(photograph.valid.at(8, 9), 255);
   bend(-0.1);
-  for (const float value : load().rgb.data()) ASSERT_TRUE(std::isfinite(value));
+  const Photograph straight = load();
+  for (const float value : straight.rgb.data()) ASSERT_TRUE(std::isfinite(value));
 }
 
 TEST_F(LoadPhotograph, SizesMustAgreeWithTheCamera) {
