@@ -1,0 +1,137 @@
+#include "roxel/depth/depth_map.h"
+
+#include <cmath>
+
+namespace roxel {
+
+namespace {
+
+/// Responsibility of one chord and where in depth it lies.
+struct Share {
+  float r;
+  float depth;       ///< where rays that end in the chord end on average
+  float half_chord;  ///< in depth
+};
+
+struct PixelDepth {
+  float depth = 0, variance = 0, opacity = 0;
+};
+
+/// Index of the share in which half of the responsibility is reached.
+std::size_t median_share(const std::vector<Share>& shares, float total) {
+  float sum = 0;
+  for (std::size_t i = 0; i < shares.size(); ++i)
+    if ((sum += shares[i].r) >= 0.5f * total) return i;
+  return shares.size() - 1;
+}
+
+/// Mean and variance over shares [begin, end).
+PixelDepth moments(const std::vector<Share>& shares, std::size_t begin, std::size_t end) {
+  double weight = 0, first = 0, second = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const double w = shares[i].r, d = shares[i].depth, h = shares[i].half_chord;
+    weight += w;
+    first += w * d;
+    second += w * (d * d + h * h / 3);
+  }
+  if (weight <= 0) return {};
+  const double mean = first / weight;
+  return {static_cast<float>(mean), static_cast<float>(std::max(0.0, second / weight - mean * mean)), 0};
+}
+
+/// The run of shares around `middle` whose chords follow on each other and carry at least a hundredth of the
+/// largest responsibility nearby.
+std::pair<std::size_t, std::size_t> main_mode(const std::vector<Share>& shares, std::size_t middle) {
+  const float least = 0.02f * shares[middle].r;
+  const auto joined = [&](std::size_t a, std::size_t b) {
+    return shares[b].depth - shares[a].depth < 2 * (shares[a].half_chord + shares[b].half_chord);
+  };
+  std::size_t begin = middle, end = middle + 1;
+  while (begin > 0 && shares[begin - 1].r > least && joined(begin - 1, begin)) --begin;
+  while (end < shares.size() && shares[end].r > least && joined(end - 1, end)) ++end;
+  return {begin, end};
+}
+
+PixelDepth summarise(const std::vector<Share>& shares, float total, float voxel_variance, DepthEstimate estimate) {
+  if (total < DepthMap::kLeastOpacity || shares.empty()) return {0, 0, total};
+  PixelDepth all = moments(shares, 0, shares.size());
+  const std::size_t middle = median_share(shares, total);
+  if (estimate == DepthEstimate::kMedian) all.depth = shares[middle].depth;
+  if (estimate == DepthEstimate::kMainMode) {
+    const auto [begin, end] = main_mode(shares, middle);
+    all.depth = moments(shares, begin, end).depth;
+  }
+  all.variance += voxel_variance;
+  all.opacity = total;
+  return all;
+}
+
+/// Evaluates single pixels against the colours that a prepared scratch holds.
+class PixelDepthMarch {
+ public:
+  PixelDepthMarch(const LatticeStack& stack, const PassOptions& pass, const DepthOptions& options, NodeScratch& scratch)
+      : pass_(pass), options_(options), box_slots_(stack.volume().box_slot_count()),
+        march_(stack, scratch, pass.opacity.model, pass.opacity.background, pass.opacity.filters) {}
+
+  PixelDepth at(const SampleView& view, int x, int y) {
+    const Region region{0, x, y};
+    const RegionStats sample = view.pyramid->at(0, x, y);
+    if (sample.valid <= 0) return {};
+    steps_.clear();
+    shares_.clear();
+    RemovedColor removed;
+    const Ray ray = region_ray(view, region);
+    const Segment whole = march_.march(view, region, sample, ray, view.plan.range, removed, steps_);
+    const float background = background_likelihood(pass_.opacity.background, pass_.opacity.model, sample);
+    const float z = whole.likelihood + whole.transmittance * background;
+    float transmittance = 1, total = 0, in_world = 0;
+    for (const EvaluatedStep& step : steps_) {
+      const float prior = transmittance * step.opacity;
+      transmittance *= 1 - step.opacity;
+      if (step.slot >= box_slots_) continue;
+      const float r = options_.likelihood ? (z > 0 ? prior * step.likelihood / z : 0) : prior;
+      const float into_chord = step.length > 0 ? step.mean_path / step.length : 0.5f;
+      shares_.push_back({r, step.depth + (2 * into_chord - 1) * step.half_chord, step.half_chord});
+      total += r;
+      in_world = step.length > 0 ? 2 * step.half_chord / step.length : in_world;
+    }
+    return summarise(shares_, total, in_world * in_world / 12, options_.estimate);
+  }
+
+ private:
+  const PassOptions& pass_;
+  const DepthOptions& options_;
+  std::uint32_t box_slots_;
+  SegmentMarch march_;
+  std::vector<EvaluatedStep> steps_;
+  std::vector<Share> shares_;
+};
+
+}  // namespace
+
+std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& samples, const SampleNode& views,
+                                     const PassOptions& pass, const Totals& totals, const DepthOptions& options,
+                                     const RunContext& context, NodeScratch& scratch) {
+  if (pass.predictive)
+    march_color(stack, samples, pass.opacity.model, pass.opacity.background, false, context, scratch);
+  scratch.compare_with(totals.color);
+  PixelDepthMarch march(stack, pass, options, scratch);
+  std::vector<DepthMap> maps;
+  for (const SampleView& view : views) {
+    const int width = view.camera.intrinsics.width, height = view.camera.intrinsics.height;
+    DepthMap map{Image(width, height, 1), Image(width, height, 1), Image(width, height, 1)};
+    for (int y = 0; y < height; ++y) {
+      context.throw_if_cancelled();
+      for (int x = 0; x < width; ++x) {
+        const PixelDepth pixel = march.at(view, x, y);
+        *map.depth.pixel(x, y) = pixel.depth;
+        *map.variance.pixel(x, y) = pixel.variance;
+        *map.opacity.pixel(x, y) = pixel.opacity;
+      }
+    }
+    maps.push_back(std::move(map));
+  }
+  return maps;
+}
+
+}  // namespace roxel

@@ -1,0 +1,36 @@
+#pragma once
+/// Depth and its variance per pixel, from the responsibilities of the voxels along the pixel's ray
+/// ([Jethwa04] section 6.2; docs/depth.md).
+
+#include "roxel/infer/run_pass.h"
+
+namespace roxel {
+
+/// Planes of one float a pixel, of the view's size.
+struct DepthMap {
+  Image depth;     ///< distance along the optical axis, world units; 0 = none (opacity below kLeastOpacity)
+  Image variance;  ///< of the depth, world units squared
+  Image opacity;   ///< posterior probability that the ray ends in the box
+
+  static constexpr float kLeastOpacity = 0.05f;
+};
+
+enum class DepthEstimate {
+  kMean,      ///< sum r d / sum r: [Jethwa04] eq. (6.1)
+  kMedian,    ///< the depth that half of the responsibility lies in front of
+  kMainMode,  ///< mean over the stretch of responsibility around the median that is not broken by a gap
+};
+
+struct DepthOptions {
+  DepthEstimate estimate = DepthEstimate::kMainMode;
+  bool likelihood = true;  ///< weigh by the posterior r_s; false: by a_s T_s, without looking at the image
+};
+
+/// The depth maps of a node's views at full resolution. `samples` are the node's views as the passes use them (for
+/// leaving the node out), `views` the same views with level 0 alone; `totals` the colours of all nodes. World
+/// variance includes s^2/12 for the voxel's extent.
+std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& samples, const SampleNode& views,
+                                     const PassOptions& pass, const Totals& totals, const DepthOptions& options,
+                                     const RunContext& context, NodeScratch& scratch);
+
+}  // namespace roxel

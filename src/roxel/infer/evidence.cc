@@ -1,0 +1,145 @@
+#include "roxel/infer/evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "roxel/base/error.h"
+
+namespace roxel {
+
+namespace {
+
+constexpr float kLargestColor = 1023.0f;
+constexpr float kLargestOpacitySum = 1 << 20;
+
+std::int64_t fixed(double value, double unit) { return std::llrint(value * unit); }
+
+template <class Visit>
+void for_each_entered_slot(const LatticeStack& stack, const NodeScratch& node, Visit&& visit) {
+  for (const std::uint32_t number : node.entered_bricks()) {
+    const Brick& brick = stack.brick(number);
+    visit(number, brick.first_slot, brick.first_slot + brick.count);
+  }
+}
+
+}  // namespace
+
+NodeScratch::NodeScratch(const LatticeStack& stack, const std::vector<float>& tau)
+    : stack_(&stack), tau_(tau.data()), voxels_(new VoxelScratch[stack.volume().slot_count()]),
+      entered_(stack.brick_count(), 0) {}
+
+void NodeScratch::set_up_brick(std::uint32_t number) {
+  entered_[number] = 1;
+  order_.push_back(number);
+  const Brick& brick = stack_->brick(number);
+  for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count; ++slot) {
+    VoxelScratch& voxel = voxels_[slot];
+    voxel = VoxelScratch{};
+    voxel.tau = tau_[slot];
+    if (totals_) color_of(totals_[slot], voxel.mean, voxel.cov, voxel.evidence);
+  }
+}
+
+void NodeScratch::compare_with(const std::vector<ColorTotals>& totals) {
+  totals_ = totals.data();
+  for_each_entered_slot(*stack_, *this, [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t slot = begin; slot < end; ++slot) {
+      VoxelScratch& voxel = voxels_[slot];
+      ColorTotals others = totals[slot];
+      const ColorTotals own = capped_color(voxel);
+      for (int c = 0; c < 10; ++c) others[c] -= own[c];
+      color_of(others, voxel.mean, voxel.cov, voxel.evidence);
+      voxel.hits = voxel.exposure = voxel.looked = 0;
+    }
+  });
+}
+
+void NodeScratch::reset() {
+  for (const std::uint32_t number : order_) entered_[number] = 0;
+  order_.clear();
+  totals_ = nullptr;
+}
+
+ColorTotals capped_color(const VoxelScratch& voxel) {
+  ColorTotals totals{};
+  const double weight = voxel.evidence;
+  if (weight <= 0) return totals;
+  const double scale = std::min(1.0, weight) / weight;
+  const auto bounded = [](double value, double limit) { return std::clamp(value, -limit, limit); };
+  totals[0] = fixed(weight * scale, kColorUnit);
+  for (int c = 0; c < 3; ++c) totals[1 + c] = fixed(bounded(voxel.mean[c] * scale, kLargestColor), kColorUnit);
+  for (int c = 0; c < 6; ++c)
+    totals[4 + c] = fixed(bounded(voxel.cov[c] * scale, kLargestColor * kLargestColor), kColorUnit);
+  return totals;
+}
+
+/// A spin lock over a brick's totals; bricks share kLocks locks.
+class Totals::BrickLock {
+ public:
+  BrickLock(Totals& totals, std::uint32_t brick) : flag_(totals.locks_[brick % kLocks]) {
+    while (flag_.test_and_set(std::memory_order_acquire)) std::this_thread::yield();
+  }
+  ~BrickLock() { flag_.clear(std::memory_order_release); }
+
+ private:
+  std::atomic_flag& flag_;
+};
+
+Totals::Totals(std::uint32_t slot_count) : color(slot_count), opacity(slot_count) {}
+
+void Totals::clear_color() { std::fill(color.begin(), color.end(), ColorTotals{}); }
+void Totals::clear_opacity() { std::fill(opacity.begin(), opacity.end(), OpacityTotals{}); }
+
+void Totals::add_color(const LatticeStack& stack, const NodeScratch& node) {
+  for_each_entered_slot(stack, node, [&](std::uint32_t brick, std::uint32_t begin, std::uint32_t end) {
+    const BrickLock lock(*this, brick);
+    for (std::uint32_t slot = begin; slot < end; ++slot) {
+      if (node[slot].evidence <= 0) continue;
+      const ColorTotals sums = capped_color(node[slot]);
+      for (int c = 0; c < 10; ++c) color[slot][c] += sums[c];
+    }
+  });
+}
+
+void Totals::add_opacity(const LatticeStack& stack, const NodeScratch& node) {
+  const auto saturated = [](float value) { return fixed(std::min(value, kLargestOpacitySum), kOpacityUnit); };
+  for_each_entered_slot(stack, node, [&](std::uint32_t brick, std::uint32_t begin, std::uint32_t end) {
+    const BrickLock lock(*this, brick);
+    for (std::uint32_t slot = begin; slot < end; ++slot) {
+      const VoxelScratch& voxel = node[slot];
+      opacity[slot][0] += saturated(voxel.hits);
+      opacity[slot][1] += saturated(voxel.exposure);
+      opacity[slot][2] += saturated(voxel.looked);
+    }
+  });
+}
+
+void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& weight) {
+  weight = static_cast<float>(totals[0] / kColorUnit);
+  if (totals[0] <= 0) {
+    std::fill(mean, mean + 3, 0.0f);
+    std::fill(cov, cov + 6, 0.0f);
+    weight = 0;
+    return;
+  }
+  const double inverse = 1.0 / static_cast<double>(totals[0]);
+  double m[3], s[6];
+  for (int c = 0; c < 3; ++c) m[c] = totals[1 + c] * inverse;
+  for (int c = 0; c < 6; ++c) s[c] = totals[4 + c] * inverse;
+  s[0] = std::max(0.0, s[0] - m[0] * m[0]);
+  s[1] = std::max(0.0, s[1] - m[1] * m[1]);
+  s[2] = std::max(0.0, s[2] - m[2] * m[2]);
+  s[3] -= m[0] * m[1];
+  s[4] -= m[0] * m[2];
+  s[5] -= m[1] * m[2];
+  // Rounding must not make the covariance indefinite: where a principal minor is negative, keep the diagonal.
+  const double minor = s[0] * s[1] - s[3] * s[3];
+  const double determinant = s[0] * (s[1] * s[2] - s[5] * s[5]) + s[3] * (s[5] * s[4] - s[3] * s[2]) +
+                             s[4] * (s[3] * s[5] - s[1] * s[4]);
+  if (minor < 0 || determinant < 0) s[3] = s[4] = s[5] = 0;
+  for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(m[c]);
+  for (int c = 0; c < 6; ++c) cov[c] = static_cast<float>(s[c]);
+}
+
+}  // namespace roxel

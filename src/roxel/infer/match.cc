@@ -1,0 +1,123 @@
+#include "roxel/infer/match.h"
+
+#include <algorithm>
+#include <cmath>
+
+// Compiled twice and chosen at load time where the compiler can: once for every x86-64, once for AVX2 + FMA.
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+#define ROXEL_KERNEL __attribute__((target_clones("arch=x86-64-v3", "default")))
+#else
+#define ROXEL_KERNEL
+#endif
+
+namespace roxel {
+
+namespace {
+
+/// 1/x - (1 - a)/a for a = 1 - exp(-x): from 1/2 at x = 0 down to 0.
+inline __attribute__((always_inline)) float mean_path_core(float x, float a) {
+  const float series = 0.5f - x * (1.0f / 12 - x * x * (1.0f / 720));
+  const float exact = 1.0f / (x + 1e-30f) - (1.0f - a) / (a + 1e-30f);
+  return x < 0.5f ? series : exact;
+}
+
+struct GaussianAgreement {
+  float normaliser;  // sqrt |S_min|
+  inline __attribute__((always_inline)) float operator()(float dx, float dy, float dz, float a, float b, float c,
+                                                         float d, float e, float f) const {
+    const float m00 = b * c - f * f, m01 = e * f - d * c, m02 = d * f - b * e;
+    const float m11 = a * c - e * e, m12 = d * e - a * f, m22 = a * b - d * d;
+    const float determinant = a * m00 + d * m01 + e * m02;
+    const float quadratic = m00 * dx * dx + m11 * dy * dy + m22 * dz * dz +
+                            2.0f * (m01 * dx * dy + m02 * dx * dz + m12 * dy * dz);
+    return normaliser / std::sqrt(determinant) * exp_negative(-0.5f * quadratic / determinant);
+  }
+};
+
+struct ExponentialAgreement {
+  float inverse_squared_scale;
+  inline __attribute__((always_inline)) float operator()(float dx, float dy, float dz, float, float, float, float,
+                                                         float, float) const {
+    return exp_negative(-(dx * dx + dy * dy + dz * dz) * inverse_squared_scale);
+  }
+};
+
+struct LinearAgreement {
+  float inverse_scale;
+  inline __attribute__((always_inline)) float operator()(float dx, float dy, float dz, float, float, float, float,
+                                                         float, float) const {
+    const float d = std::sqrt(dx * dx + dy * dy + dz * dz) * inverse_scale;
+    return d < 1.0f ? 1.0f - d : 0.0f;
+  }
+};
+
+template <class Function>
+inline __attribute__((always_inline)) void evaluate_with(const Function& agreement_of, const MatchModel& model,
+                                                         const SampleTerms& sample, int count, MatchBlock& block) {
+  const float s0 = sample.cov_plus_noise[0], s1 = sample.cov_plus_noise[1], s2 = sample.cov_plus_noise[2];
+  const float s3 = sample.cov_plus_noise[3], s4 = sample.cov_plus_noise[4], s5 = sample.cov_plus_noise[5];
+  const float foreground = sample.foreground, outlier = model.outlier;
+  const float half = model.evidence_half, uninformative = model.uninformative;
+  for (int i = 0; i < count; ++i) {
+    const float x = block.tau[i] * block.length[i];
+    const float a = one_minus_exp(x);
+    block.opacity[i] = a;
+    block.mean_path[i] = block.length[i] * mean_path_core(x, a);
+    const float matched = agreement_of(block.diff[0][i], block.diff[1][i], block.diff[2][i], block.cov[0][i] + s0,
+                                       block.cov[1][i] + s1, block.cov[2][i] + s2, block.cov[3][i] + s3,
+                                       block.cov[4][i] + s4, block.cov[5][i] + s5);
+    const float w = block.evidence[i];
+    const float mixed = (w * matched + half * uninformative) / (w + half + 1e-30f);
+    block.likelihood[i] = foreground * mixed + outlier;
+  }
+}
+
+ROXEL_KERNEL void evaluate_gaussian(const GaussianAgreement& agreement_of, const MatchModel& model,
+                                    const SampleTerms& sample, int count, MatchBlock& block) {
+  evaluate_with(agreement_of, model, sample, count, block);
+}
+ROXEL_KERNEL void evaluate_exponential(const ExponentialAgreement& agreement_of, const MatchModel& model,
+                                       const SampleTerms& sample, int count, MatchBlock& block) {
+  evaluate_with(agreement_of, model, sample, count, block);
+}
+ROXEL_KERNEL void evaluate_linear(const LinearAgreement& agreement_of, const MatchModel& model,
+                                  const SampleTerms& sample, int count, MatchBlock& block) {
+  evaluate_with(agreement_of, model, sample, count, block);
+}
+
+GaussianAgreement gaussian_of(const MatchModel& model) {
+  return {std::sqrt(model.noise_variance[0] * model.noise_variance[1] * model.noise_variance[2])};
+}
+
+}  // namespace
+
+SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model) {
+  SampleTerms terms;
+  for (int c = 0; c < 3; ++c) terms.mean[c] = sample.mean[c];
+  for (int c = 0; c < 6; ++c) terms.cov_plus_noise[c] = sample.cov[c] + (c < 3 ? model.noise_variance[c] : 0.0f);
+  terms.foreground = sample.foreground;
+  return terms;
+}
+
+void evaluate_match(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block) {
+  switch (model.agreement) {
+    case Agreement::kGaussian: return evaluate_gaussian(gaussian_of(model), model, sample, count, block);
+    case Agreement::kExponential:
+      return evaluate_exponential({1 / (model.scale * model.scale)}, model, sample, count, block);
+    case Agreement::kLinear: return evaluate_linear({1 / model.scale}, model, sample, count, block);
+  }
+}
+
+float agreement(const MatchModel& model, const float d[3], const float s[6]) {
+  switch (model.agreement) {
+    case Agreement::kGaussian:
+      return gaussian_of(model)(d[0], d[1], d[2], s[0], s[1], s[2], s[3], s[4], s[5]);
+    case Agreement::kExponential:
+      return ExponentialAgreement{1 / (model.scale * model.scale)}(d[0], d[1], d[2], 0, 0, 0, 0, 0, 0);
+    case Agreement::kLinear: return LinearAgreement{1 / model.scale}(d[0], d[1], d[2], 0, 0, 0, 0, 0, 0);
+  }
+  return 0;
+}
+
+}  // namespace roxel

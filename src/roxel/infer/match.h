@@ -1,0 +1,83 @@
+#pragma once
+/// How well what a ray sees agrees with what voxels look like, for a block of voxels at once: the innermost
+/// loop of every pass. Formulas: equations in docs/color.md and docs/passes.md; [Jethwa04] eq. (4.1), (4.2), (4.5).
+
+#include <bit>
+#include <cstdint>
+
+#include "roxel/image/sample_pyramid.h"
+
+namespace roxel {
+
+enum class Agreement {
+  kGaussian,     ///< sqrt(|S_min| / |S_12|) exp(-d' S_12^-1 d / 2), S_12 = S_1 + S_2 + S_min
+  kExponential,  ///< exp(-d^2 / scale^2)
+  kLinear,       ///< max(0, 1 - d / scale)
+};
+
+/// Everything about colour matching that is the same for a whole pass.
+struct MatchModel {
+  Agreement agreement = Agreement::kGaussian;
+  float noise_variance[3] = {16, 16, 16};  ///< diagonal of S_min, in the matching space
+  float scale = 10;                        ///< of the exponential and linear baselines, matching-space units
+  bool first_channel_wraps = false;        ///< hue: differences are taken the short way round
+  float wrap_period = 1;
+  float evidence_half = 0.2f;              ///< w_0: evidence at which a voxel's own colour counts half
+  float uninformative = 0.001f;            ///< p_0: likelihood where there is no evidence
+  float outlier = 1e-7f;                   ///< floor of every likelihood
+};
+
+/// The parts of a sample that a block of voxels shares.
+struct SampleTerms {
+  float mean[3];
+  float cov_plus_noise[6];  ///< xx, yy, zz, xy, xz, yz
+  float foreground;         ///< share of the sample that is object, 0 to 1
+};
+
+SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model);
+
+/// Structure of arrays for up to kSize voxels along a ray: the inputs are gathered, the outputs computed.
+struct alignas(64) MatchBlock {
+  static constexpr int kSize = 64;
+  float diff[3][kSize];        ///< in: voxel mean minus sample mean
+  float cov[6][kSize];         ///< in: voxel covariance
+  float evidence[kSize];       ///< in: weight w of the voxel's colour evidence
+  float tau[kSize];            ///< in: optical depth of one voxel length
+  float length[kSize];         ///< in: chord in voxel lengths
+  float opacity[kSize];        ///< out: a = 1 - exp(-tau length)
+  float mean_path[kSize];      ///< out: e = 1/tau - length (1 - a)/a, the mean distance of an ending inside
+  float likelihood[kSize];     ///< out: p
+};
+
+/// Fills the outputs of the first `count` entries.
+void evaluate_match(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block);
+
+/// Agreement of two Gaussians in (0, 1] (or the baseline's value), one pair at a time; the slow twin of the block.
+float agreement(const MatchModel& model, const float mean_difference[3], const float cov_sum_plus_noise[6]);
+
+/// exp(x) for x <= 0, relative error below 1e-6; 0 below -87. Range reduction to 2^n 2^f, |f| <= 1/2, and the
+/// series of 2^f to degree 6. Plain arithmetic, so that loops around it vectorise.
+inline __attribute__((always_inline)) float exp_negative(float x) {
+  const float clamped = x < -87.0f ? -87.0f : x;
+  const float y = clamped * 1.44269504088896341f;
+  const int n = static_cast<int>(y - 0.5f);  // y <= 0: truncation rounds to the nearest
+  const float f = y - static_cast<float>(n);
+  float s = 1.540353039e-4f;
+  s = s * f + 1.333355814e-3f;
+  s = s * f + 9.618129107e-3f;
+  s = s * f + 5.550410866e-2f;
+  s = s * f + 2.402265070e-1f;
+  s = s * f + 6.931471806e-1f;
+  s = s * f + 1.0f;
+  const float power = std::bit_cast<float>((n + 127) << 23);
+  return x < -87.0f ? 0.0f : s * power;
+}
+
+/// 1 - exp(-x) for x >= 0, relative error below 2e-6.
+inline __attribute__((always_inline)) float one_minus_exp(float x) {
+  const float series =
+      x * (1.0f - x * (0.5f - x * (1.0f / 6 - x * (1.0f / 24 - x * (1.0f / 120 - x * (1.0f / 720))))));
+  return x < 0.25f ? series : 1.0f - exp_negative(-x);
+}
+
+}  // namespace roxel

@@ -1,0 +1,259 @@
+#include "roxel/infer/passes.h"
+
+#include <cmath>
+
+namespace roxel {
+
+PassCounts& PassCounts::operator+=(const PassCounts& other) {
+  rays += other.rays;
+  steps += other.steps;
+  log_likelihood += other.log_likelihood;
+  observation_weight += other.observation_weight;
+  return *this;
+}
+
+namespace {
+
+/// Calls visit(view, region) for every root sample of the node, in a fixed order.
+template <class Visit>
+void for_each_root(const SampleNode& node, const RunContext& context, Visit&& visit) {
+  for (const SampleView& view : node) {
+    const int level = view.plan.root_level;
+    for (int y = 0; y < view.pyramid->height(level); ++y) {
+      context.throw_if_cancelled();
+      for (int x = 0; x < view.pyramid->width(level); ++x) visit(view, Region{level, x, y});
+    }
+  }
+}
+
+class ColorMarch {
+ public:
+  ColorMarch(const LatticeStack& stack, const MatchModel& model, const Background& background, bool everywhere,
+             NodeScratch& scratch)
+      : stack_(stack), model_(model), background_(background), everywhere_(everywhere), scratch_(scratch) {}
+
+  void march(const SampleView& view, const Region& region, double begin, float transmittance) {
+    const RegionStats sample = view.pyramid->at(region.level, region.x, region.y);
+    if (sample.valid <= 0) return;
+    const Stretch range = served_range(view, region, begin);
+    if (range.end > range.begin) transmittance = deposit(view, region, sample, range, transmittance);
+    if (range.end >= view.plan.range.end || region.level == view.plan.finest_level) return;
+    if (!everywhere_ && transmittance < kOpaque) return;
+    for (int c = 0; c < 4; ++c)
+      if (const Region child = region.child(c); inside(view, child))
+        march(view, child, std::max(range.begin, range.end), transmittance);
+  }
+
+  PassCounts counts;
+
+ private:
+  static constexpr float kOpaque = 1e-4f;
+  static constexpr int kChunk = 32;
+
+  float deposit(const SampleView& view, const Region& region, const RegionStats& sample, Stretch range,
+                float transmittance) {
+    const float weight = observation_weight(view, region, sample) * sample.foreground *
+                         (1 - (background_.kind == BackgroundKind::kKnown
+                                   ? known_background_share(background_, model_, sample)
+                                   : 0.0f));
+    float second[6];
+    for (int c = 0; c < 3; ++c) second[c] = sample.cov[c] + sample.mean[c] * sample.mean[c];
+    second[3] = sample.cov[3] + sample.mean[0] * sample.mean[1];
+    second[4] = sample.cov[4] + sample.mean[0] * sample.mean[2];
+    second[5] = sample.cov[5] + sample.mean[1] * sample.mean[2];
+    ++counts.rays;
+    VoxelStep chunk[kChunk];
+    int filled = 0;
+    const auto flush = [&] {
+      for (int i = 0; i < filled; ++i) {
+        VoxelScratch& voxel = scratch_[chunk[i].slot];
+        const float a = everywhere_ ? 1.0f : one_minus_exp(voxel.tau * chunk[i].length);
+        const float w = (everywhere_ ? 1.0f : a * transmittance) * chunk[i].weight * weight;
+        if (!everywhere_) transmittance *= 1 - a;
+        if (w < 1e-9f) continue;
+        voxel.evidence += w;
+        for (int c = 0; c < 3; ++c) voxel.mean[c] += w * sample.mean[c];
+        for (int c = 0; c < 6; ++c) voxel.cov[c] += w * second[c];
+      }
+      counts.steps += filled;
+      filled = 0;
+      return everywhere_ || transmittance > kOpaque;
+    };
+    bool running = true;
+    stack_.walk(region_ray(view, region), range, [&](std::uint32_t brick) { scratch_.enter(brick); },
+                [&](const VoxelStep& step, const VoxelPlace&) {
+                  __builtin_prefetch(&scratch_[step.slot], 1);
+                  chunk[filled++] = step;
+                  if (filled == kChunk) running = flush();
+                  return running;
+                });
+    flush();
+    return transmittance;
+  }
+
+  const LatticeStack& stack_;
+  const MatchModel& model_;
+  const Background& background_;
+  bool everywhere_;
+  NodeScratch& scratch_;
+};
+
+/// One sample of the tree that a root sample divides into: its own stretch of steps and what its children add.
+struct TreeNode {
+  Region region;
+  std::uint32_t first_step = 0;
+  std::uint32_t end_step = 0;
+  Segment own;
+  float weight = 0;            ///< observation weight
+  float background = 0;        ///< p_bg, for leaves
+  float behind = 0;            ///< leaves: p_bg; inner: product of Z_c^{share}
+  float z = 0;                 ///< own.Z + own.T * behind
+  float agreement_sum = 0;     ///< roxels: of this stretch; and with the best leaf path behind it
+  float best_path_sum = 0;
+  int children[4] = {-1, -1, -1, -1};
+};
+
+class OpacityMarch {
+ public:
+  OpacityMarch(const LatticeStack& stack, const OpacityPassOptions& options, NodeScratch& scratch)
+      : options_(options), scratch_(scratch),
+        march_(stack, scratch, options.model, options.background, options.filters) {
+    march_.set_early_stop(options.rule == UpdateRule::kPosterior);
+  }
+
+  void root(const SampleView& view, const Region& region) {
+    tree_.clear();
+    steps_.clear();
+    const int top = build(view, region, view.plan.range.begin, RemovedColor{});
+    if (top < 0) return;
+    const TreeNode& node = tree_[top];
+    counts.observation_weight += node.weight;
+    if (options_.rule == UpdateRule::kPosterior) {
+      counts.log_likelihood += node.weight * std::log(std::max(node.z, 1e-30f));
+      distribute_posterior(top, 1.0f);
+    } else {
+      distribute_roxels(top, std::max(node.best_path_sum, 1e-30f), 0.0f);
+    }
+  }
+
+  PassCounts counts;
+
+ private:
+  /// Marches the region and, depth first, its children; returns its index in tree_, or -1 without valid pixels.
+  int build(const SampleView& view, const Region& region, double begin, RemovedColor removed) {
+    const RegionStats sample = view.pyramid->at(region.level, region.x, region.y);
+    if (sample.valid <= 0) return -1;
+    const int self = static_cast<int>(tree_.size());
+    tree_.push_back({});
+    TreeNode node;
+    node.region = region;
+    node.weight = observation_weight(view, region, sample);
+    node.first_step = static_cast<std::uint32_t>(steps_.size());
+    const Stretch range = served_range(view, region, begin);
+    if (range.end > range.begin) {
+      ++counts.rays;
+      node.own = march_.march(view, region, sample, region_ray(view, region), range, removed, steps_);
+    }
+    node.end_step = static_cast<std::uint32_t>(steps_.size());
+    counts.steps += node.end_step - node.first_step;
+    for (std::uint32_t s = node.first_step; s < node.end_step; ++s) node.agreement_sum += steps_[s].likelihood;
+
+    const bool ends = range.end >= view.plan.range.end || region.level == view.plan.finest_level;
+    const bool spent = options_.rule == UpdateRule::kPosterior &&
+                       node.own.transmittance < SegmentMarch::kNegligible * node.own.likelihood;
+    if (!ends && !spent) add_children(view, std::max(range.begin, range.end), removed, node);
+    if (ends || spent || node.behind <= 0) {
+      node.background = background_likelihood(options_.background, options_.model, sample);
+      if (ends || spent) node.behind = node.background;
+      node.best_path_sum = std::max(node.best_path_sum, node.background);
+    }
+    node.best_path_sum += node.agreement_sum;
+    node.z = node.own.likelihood + node.own.transmittance * node.behind;
+    tree_[self] = node;
+    return self;
+  }
+
+  /// The four children are quarter-weight observations of what lies behind: behind = prod Z_c^{share}.
+  void add_children(const SampleView& view, double begin, const RemovedColor& removed, TreeNode& node) {
+    float total = 0, log_sum = 0;
+    for (int c = 0; c < 4; ++c) {
+      const Region child = node.region.child(c);
+      if (!inside(view, child)) continue;
+      const int index = build(view, child, begin, removed);
+      node.children[c] = index;
+      if (index < 0) continue;
+      total += tree_[index].weight;
+      log_sum += tree_[index].weight * std::log(std::max(tree_[index].z, 1e-30f));
+      node.best_path_sum = std::max(node.best_path_sum, tree_[index].best_path_sum);
+    }
+    if (total > 0) node.behind = std::exp(log_sum / total);
+  }
+
+  /// Gives out probability `reach` (of the ray getting as far as this sample's stretch) to its voxels and children.
+  void distribute_posterior(int index, float reach) {
+    const TreeNode& node = tree_[index];
+    if (node.z <= 0) return;
+    const float scale = reach / node.z;
+    float transmittance = 1, remaining = reach;
+    for (std::uint32_t s = node.first_step; s < node.end_step; ++s) {
+      const EvaluatedStep& step = steps_[s];
+      const float r = std::min(scale * transmittance * step.opacity * step.likelihood, remaining);
+      VoxelScratch& voxel = scratch_[step.slot];
+      const float w = options_.ray_weights ? node.weight * step.weight : node.weight;
+      voxel.hits += w * r;
+      voxel.exposure += w * ((remaining - r) * step.length + r * step.mean_path);
+      voxel.looked = std::max(voxel.looked, remaining * step.weight);
+      remaining -= r;
+      transmittance *= 1 - step.opacity;
+    }
+    const float onward = reach * transmittance * node.behind / node.z;
+    for (const int child : node.children)
+      if (child >= 0 && onward > 1e-6f) distribute_posterior(child, onward);
+  }
+
+  /// [Jethwa04] section 2.3.2 steps 3 and 4, normalised by the largest sum over the leaf paths (section 5.1.1).
+  void distribute_roxels(int index, float path_sum, float explained) {
+    const TreeNode& node = tree_[index];
+    for (std::uint32_t s = node.first_step; s < node.end_step; ++s) {
+      const EvaluatedStep& step = steps_[s];
+      const float r = step.likelihood / path_sum;
+      const float alpha = std::min(r / std::max(1 - explained, 1e-6f), 1.0f);
+      VoxelScratch& voxel = scratch_[step.slot];
+      const float w = node.weight * (options_.ray_weights ? step.weight : 1.0f) * r;
+      voxel.hits += w;
+      voxel.exposure += w * alpha;
+      voxel.looked = std::max(voxel.looked, (1 - explained) * step.weight);
+      explained = std::min(explained + r, 1.0f);
+    }
+    for (const int child : node.children)
+      if (child >= 0) distribute_roxels(child, path_sum, explained);
+  }
+
+  const OpacityPassOptions& options_;
+  NodeScratch& scratch_;
+  SegmentMarch march_;
+  std::vector<TreeNode> tree_;
+  std::vector<EvaluatedStep> steps_;
+};
+
+}  // namespace
+
+PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MatchModel& model,
+                       const Background& background, bool everywhere, const RunContext& context,
+                       NodeScratch& scratch) {
+  ColorMarch march(stack, model, background, everywhere, scratch);
+  for_each_root(node, context, [&](const SampleView& view, const Region& region) {
+    march.march(view, region, view.plan.range.begin, 1.0f);
+  });
+  return march.counts;
+}
+
+PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const OpacityPassOptions& options,
+                         const RunContext& context, NodeScratch& scratch) {
+  OpacityMarch march(stack, options, scratch);
+  for_each_root(node, context,
+                [&](const SampleView& view, const Region& region) { march.root(view, region); });
+  return march.counts;
+}
+
+}  // namespace roxel

@@ -1,0 +1,114 @@
+#include "roxel/infer/update.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "roxel/base/parallel.h"
+#include "roxel/volume/neighbours.h"
+
+namespace roxel {
+
+namespace {
+
+constexpr float kLargestTau = 16;
+constexpr std::int64_t kGrain = 1 << 15;
+
+/// Mean of the 8 neighbours in the plane spanned by two strides of the gathered block.
+float plane_mean(const float* centre, int stride_a, int stride_b) {
+  float sum = 0;
+  for (int a = -1; a <= 1; ++a)
+    for (int b = -1; b <= 1; ++b) sum += centre[a * stride_a + b * stride_b];
+  return (sum - *centre) / 8;
+}
+
+void sheet_prior_of_brick(const BrickIndex& index, int brick_idx, const std::vector<float>& opacity,
+                          const PriorOptions& prior, std::vector<float>& field) {
+  float block[kBlockVoxels];
+  gather_block(index, opacity.data(), brick_idx, 0.0f, block);
+  const Brick& brick = index.bricks()[brick_idx];
+  const float lambda = static_cast<float>(prior.spatial_lambda);
+  const float base = (1 - lambda) * static_cast<float>(prior.opacity);
+  constexpr int kX = 1, kY = kBlockSide, kZ = kBlockSide * kBlockSide;
+  for (int k = 0; k < kBrickSide; ++k)
+    for (int j = 0; j < kBrickSide; ++j)
+      for (int i = 0; i < kBrickSide; ++i) {
+        const std::uint16_t voxel = brick.local[voxel_in_brick(i, j, k)];
+        if (voxel == kNoVoxel) continue;
+        const float* centre = block + voxel_in_block(i, j, k);
+        const float sheet =
+            std::max({plane_mean(centre, kX, kY), plane_mean(centre, kX, kZ), plane_mean(centre, kY, kZ)});
+        field[brick.first_slot + voxel] = base + lambda * sheet;
+      }
+}
+
+}  // namespace
+
+std::vector<float> prior_opacity_field(const Volume& volume, const PriorOptions& prior, int threads) {
+  std::vector<float> field(volume.slot_count(), static_cast<float>(prior.opacity));
+  if (prior.spatial_lambda <= 0) return field;
+  std::vector<float> opacity(volume.slot_count());
+  parallel_for_blocks(volume.slot_count(), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    for (std::int64_t slot = begin; slot < end; ++slot) opacity[slot] = alpha_from_tau(volume.tau[slot]);
+  });
+  for (int k = 0; k < volume.lattice_count(); ++k) {
+    const BrickIndex& index = volume.index(k);
+    parallel_for_blocks(index.bricks().size(), 64, threads, [&](std::int64_t begin, std::int64_t end, int) {
+      for (std::int64_t b = begin; b < end; ++b)
+        sheet_prior_of_brick(index, static_cast<int>(b), opacity, prior, field);
+    });
+  }
+  return field;
+}
+
+UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::vector<float>& prior_opacity,
+                            double prior_strength, int threads, Volume& volume) {
+  struct Sums {
+    double change = 0, opacity = 0;
+    std::int64_t looked = 0;
+  };
+  const std::int64_t count = volume.slot_count();
+  std::vector<Sums> blocks((count + kGrain - 1) / kGrain);
+  parallel_for_blocks(count, kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    Sums sums;
+    for (std::int64_t slot = begin; slot < end; ++slot) {
+      const double hits = totals.opacity[slot][0] / kOpacityUnit;
+      const double exposure = totals.opacity[slot][1] / kOpacityUnit;
+      const double looked = totals.opacity[slot][2] / kOpacityUnit;
+      const double prior_tau = -std::log1p(-std::min(prior_opacity[slot], 0.999999f));
+      double tau;
+      if (rule == UpdateRule::kPosterior) {
+        const double weight = exposure + prior_strength;
+        tau = weight > 0 ? (hits + prior_strength * prior_tau) / weight : prior_tau;
+      } else {
+        tau = hits > 1e-3 ? -std::log1p(-std::min(exposure / hits, 0.999999)) : prior_tau;
+      }
+      const float before = alpha_from_tau(volume.tau[slot]);
+      volume.tau[slot] = static_cast<float>(std::clamp(tau, 0.0, static_cast<double>(kLargestTau)));
+      volume.confidence[slot] = static_cast<float>(looked / (looked + 2));
+      volume.support[slot] = {static_cast<float>(hits), static_cast<float>(exposure)};
+      const float after = alpha_from_tau(volume.tau[slot]);
+      sums.opacity += after;
+      if (looked > 0) sums.change += std::abs(after - before), ++sums.looked;
+    }
+    blocks[begin / kGrain] = sums;
+  });
+  Sums all;
+  for (const Sums& sums : blocks) {
+    all.change += sums.change;
+    all.opacity += sums.opacity;
+    all.looked += sums.looked;
+  }
+  return {all.looked ? all.change / all.looked : 0, count ? all.opacity / count : 0};
+}
+
+void update_color(const Totals& totals, int threads, Volume& volume) {
+  parallel_for_blocks(volume.slot_count(), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    for (std::int64_t slot = begin; slot < end; ++slot) {
+      if (totals.color[slot][0] <= 0) continue;
+      color_of(totals.color[slot], volume.color_mean[slot].data(), volume.color_cov[slot].data(),
+               volume.color_weight[slot]);
+    }
+  });
+}
+
+}  // namespace roxel

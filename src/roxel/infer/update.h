@@ -1,0 +1,33 @@
+#pragma once
+/// From the evidence of all nodes to the volume: opacity under its prior, colour, confidence. docs/passes.md.
+
+#include "roxel/infer/evidence.h"
+#include "roxel/infer/passes.h"
+
+namespace roxel {
+
+/// Gamma prior on optical depth with its mode at a field that knows that surfaces are sheets.
+struct PriorOptions {
+  double opacity = 0.02;       ///< alpha_0, in (0, 1)
+  double strength = 5;         ///< beta >= 0, in observations
+  double spatial_lambda = 0.95;  ///< lambda in [0, 1]: weight of the neighbours' opacity in the prior's mode
+};
+
+/// The prior's mode of every voxel, as opacity: (1 - lambda) alpha_0 + lambda * the largest mean opacity of the
+/// voxel's 8 neighbours in one of the three axis planes; absent neighbours count 0.
+std::vector<float> prior_opacity_field(const Volume& volume, const PriorOptions& prior, int threads);
+
+struct UpdateReport {
+  double mean_opacity_change = 0;  ///< over voxels that were looked at
+  double mean_opacity = 0;         ///< over all voxels
+};
+
+/// Sets tau, confidence and support from the totals.
+/// Posterior: tau <- (hits + beta tau_0) / (exposure + beta). Roxels: alpha <- exposure / hits, alpha_0 without hits.
+UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::vector<float>& prior_opacity,
+                            double prior_strength, int threads, Volume& volume);
+
+/// Sets the colour channels from the totals; voxels without evidence keep what they have.
+void update_color(const Totals& totals, int threads, Volume& volume);
+
+}  // namespace roxel

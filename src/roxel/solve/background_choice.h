@@ -1,0 +1,20 @@
+#pragma once
+/// Which background a data set has, from its masks and the pixels along the images' borders.
+
+#include "roxel/solve/scene.h"
+
+namespace roxel {
+
+/// What one image tells: whether it has a mask, and the colours along its border.
+struct BorderSample {
+  bool has_mask = false;
+  std::vector<std::array<float, 3>> colors;  ///< matching space, a few hundred
+};
+
+BorderSample sample_border(const Photograph& photo, const Scene& scene);
+
+/// Chooses, or obeys options.background; appends to scene.notes why. Throws InvalidInput where masks are asked
+/// for and missing.
+void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options, Scene& scene);
+
+}  // namespace roxel

@@ -1,0 +1,163 @@
+#include "roxel/solve/options.h"
+
+namespace roxel {
+
+namespace {
+
+using Options = ReconstructOptions;
+
+void add_volume(OptionTable<Options>& table) {
+  table.group("Volume");
+  table.add("bounds", &Options::bounds)
+      .help("Box to reconstruct: x0,y0,z0,x1,y1,z1")
+      .unit("world units")
+      .unset("from the data set, its points, masks, or cameras");
+  table.add("near", &Options::near).help("Nearest depth that is looked for").unit("world units").above(0).unset(
+      "from the cameras and points");
+  table.add("far", &Options::far).help("Depth at which rays end").unit("world units").above(0).unset(
+      "from the cameras and points");
+  table.add("voxel-size", &Options::voxel_size)
+      .help("Edge of the finest voxels; overrides --resolution")
+      .unit("world units")
+      .above(0)
+      .unset("from --resolution");
+  table.add("resolution", &Options::resolution)
+      .help("Finest voxels along the longest side of the box")
+      .range(8, 65536);
+  table.add("levels", &Options::levels)
+      .help("Levels of resolution, each with half the voxel size of the one before")
+      .range(1, 16)
+      .source("[Jethwa04] section 5.2.2");
+  table.add("passes", &Options::passes).help("Most passes a level").range(1, 10000).source("measured on plane and head");
+  table.add("tolerance", &Options::tolerance)
+      .help("Mean change of opacity in a pass that ends a level")
+      .range(0, 1);
+  table.add("all-passes", &Options::all_passes).help("Do all passes of every level, whatever the tolerance");
+  table.add("surround", &Options::surround,
+            {{"auto", SurroundChoice::kAuto}, {"on", SurroundChoice::kOn}, {"off", SurroundChoice::kOff}})
+      .help("Ever coarser voxels around the box, out to the far distance, so that every ray has a place to end; "
+            "auto: where the background is not known");
+}
+
+void add_sampling(OptionTable<Options>& table) {
+  table.group("Sampling");
+  table.add("adaptive", &Options::adaptive)
+      .help("Rays start coarse and divide with distance")
+      .source("[Jethwa04] section 5.1.1");
+  table.add("samples-per-voxel", &Options::samples_per_voxel)
+      .help("Samples across a voxel, along an axis")
+      .range(0.25, 16)
+      .source("measured");
+  table.add("interpolate", &Options::interpolate)
+      .help("Interpolate the image at each voxel centre's projection");
+  table.add("observation-weight", &Options::observation_weight)
+      .help("Observations that one image makes of a voxel in the middle of the box")
+      .above(0)
+      .source("measured");
+}
+
+void add_color(OptionTable<Options>& table) {
+  table.group("Colour");
+  table.add("color-space", &Options::color_space,
+            {{"luv", ColorSpace::kLuv}, {"rgb", ColorSpace::kRgb}, {"srgb", ColorSpace::kSrgb}, {"hsv", ColorSpace::kHsv}})
+      .help("Space that colours are compared in")
+      .source("[Jethwa04] section 4.3");
+  table.add("white-point", &Options::white_point)
+      .help("White of CIE Luv: D65, A, C, or chromaticities x,y")
+      .source("[Jethwa04] section 9.2");
+  table.add("noise", &Options::noise)
+      .help("Standard deviation of colour that is always granted")
+      .unit("units of the colour space")
+      .above(0)
+      .unset("4 in Luv, the same share of the gamut elsewhere");
+  table.add("agreement", &Options::agreement,
+            {{"gaussian", Agreement::kGaussian}, {"exponential", Agreement::kExponential}, {"linear", Agreement::kLinear}})
+      .help("How two colours are matched")
+      .source("[Jethwa04] eq. (4.5), (4.2), (4.1)");
+  table.add("agreement-scale", &Options::agreement_scale)
+      .help("Scale of exponential and linear agreement")
+      .unit("units of the colour space")
+      .above(0)
+      .unset("2.5 times the noise (exponential), 5 times (linear)");
+  table.add("outlier", &Options::outlier).help("Floor of every likelihood").range(0, 1);
+  table.add("uninformative", &Options::uninformative)
+      .help("Likelihood of a colour where a voxel has no evidence")
+      .range(0, 1)
+      .unset("that of an unknown background");
+  table.add("evidence-half", &Options::evidence_half)
+      .help("Colour evidence, in nodes, at which a voxel's own colour counts half")
+      .range(0, 1000);
+  table.add("predictive", &Options::predictive)
+      .help("Compare a ray with what other nodes saw, leaving its own out");
+}
+
+void add_background(OptionTable<Options>& table) {
+  table.group("Background");
+  table.add("background", &Options::background,
+            {{"auto", BackgroundChoice::kAuto},
+             {"none", BackgroundChoice::kNone},
+             {"unknown", BackgroundChoice::kUnknown},
+             {"black", BackgroundChoice::kBlack},
+             {"constant", BackgroundChoice::kConstant},
+             {"mask", BackgroundChoice::kMask}})
+      .help("What a ray sees that passes every voxel");
+  table.add("background-color", &Options::background_color)
+      .help("Colour of a constant background: linear r,g,b")
+      .unset("estimated from the images' borders");
+  table.add("filter-rays", &Options::filter_rays)
+      .help("Remove what a voxel explains from the sample behind it")
+      .source("[Jethwa04] appendix B, -fc");
+  table.add("filter-background", &Options::filter_background)
+      .help("Remove a known background's share from samples")
+      .source("[Jethwa04] appendix B, -fbg");
+}
+
+void add_opacity(OptionTable<Options>& table) {
+  table.group("Opacity");
+  table.add("update", &Options::update, {{"posterior", UpdateRule::kPosterior}, {"roxels", UpdateRule::kRoxels}})
+      .help("How a pass updates opacities")
+      .source("docs/passes.md; [DeBonet99]");
+  table.add("spatial-prior", &Options::spatial_prior)
+      .help("Weight of the neighbours' opacity in the prior: surfaces are sheets")
+      .range(0, 1);
+  table.add("prior-strength", &Options::prior_strength).help("Weight of the prior").unit("observations").at_least(0);
+  table.add("prior-opacity", &Options::prior_opacity).help("Opacity of a voxel about which nothing is known").above(0).below(1);
+  table.add("ray-weights", &Options::ray_weights)
+      .help("Weigh opacity sums, too, by how near a ray passes to the voxel's centre");
+  table.add("opacity-threshold", &Options::opacity_threshold)
+      .help("Voxels below this opacity are dropped between levels")
+      .range(0, 0.999)
+      .source("measured");
+  table.add("confidence-threshold", &Options::confidence_threshold)
+      .help("Voxels below this confidence are dropped between levels and from the result")
+      .range(0, 0.999);
+}
+
+OptionTable<Options> make_table() {
+  OptionTable<Options> table;
+  add_volume(table);
+  add_sampling(table);
+  add_color(table);
+  add_background(table);
+  add_opacity(table);
+  table.rule([](const Options& o) -> std::string {
+    if (!o.bounds) return "";
+    for (int axis = 0; axis < 3; ++axis)
+      if ((*o.bounds)[axis] >= (*o.bounds)[axis + 3])
+        return "--bounds: the first corner must be below the second in x, y and z";
+    return "";
+  });
+  table.rule([](const Options& o) -> std::string {
+    return o.near && o.far && *o.near >= *o.far ? "--near must be below --far" : "";
+  });
+  return table;
+}
+
+}  // namespace
+
+const OptionTable<ReconstructOptions>& reconstruct_option_table() {
+  static const OptionTable<ReconstructOptions> table = make_table();
+  return table;
+}
+
+}  // namespace roxel

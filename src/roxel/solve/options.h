@@ -1,0 +1,67 @@
+#pragma once
+/// Everything a user may choose about a reconstruction. Each field's name on the command line, range, unit and
+/// source stand once, in reconstruct_option_table().
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "roxel/base/option_table.h"
+#include "roxel/color/color_space.h"
+#include "roxel/infer/passes.h"
+
+namespace roxel {
+
+enum class BackgroundChoice { kAuto, kNone, kUnknown, kBlack, kConstant, kMask };
+enum class SurroundChoice { kAuto, kOn, kOff };
+
+struct ReconstructOptions {
+  // What is reconstructed, and how finely
+  std::optional<std::array<double, 6>> bounds;  ///< x0, y0, z0, x1, y1, z1
+  std::optional<double> near;
+  std::optional<double> far;
+  std::optional<double> voxel_size;  ///< of the finest level; otherwise from `resolution`
+  int resolution = 256;              ///< voxels along the longest side, at the finest level
+  int levels = 3;
+  int passes = 8;
+  double tolerance = 1e-4;
+  bool all_passes = false;
+  SurroundChoice surround = SurroundChoice::kAuto;
+
+  // How images are sampled
+  bool adaptive = true;
+  double samples_per_voxel = 2;
+  bool interpolate = false;
+  double observation_weight = 4;
+
+  // Colour and its agreement
+  ColorSpace color_space = ColorSpace::kLuv;
+  std::string white_point = "D65";
+  std::optional<double> noise;
+  Agreement agreement = Agreement::kGaussian;
+  std::optional<double> agreement_scale;
+  double outlier = 1e-7;
+  std::optional<double> uninformative;
+  double evidence_half = 0.2;
+  bool predictive = true;
+
+  // Background
+  BackgroundChoice background = BackgroundChoice::kAuto;
+  std::optional<std::array<double, 3>> background_color;  ///< linear RGB
+  bool filter_rays = false;
+  bool filter_background = false;
+
+  // Opacity
+  UpdateRule update = UpdateRule::kPosterior;
+  double spatial_prior = 0.95;
+  double prior_strength = 5;
+  double prior_opacity = 0.02;
+  bool ray_weights = false;
+  double opacity_threshold = 0.04;
+  double confidence_threshold = 0;
+};
+
+/// The one table that the command line, JSON, the summary and the docs are made from.
+const OptionTable<ReconstructOptions>& reconstruct_option_table();
+
+}  // namespace roxel

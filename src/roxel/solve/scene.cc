@@ -1,0 +1,189 @@
+#include "roxel/solve/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "roxel/base/error.h"
+#include "roxel/base/parallel.h"
+#include "roxel/solve/background_choice.h"
+
+namespace roxel {
+
+namespace {
+
+constexpr int kMostSurround = 12;
+constexpr double kMiddleGrey = 0.18;
+constexpr float kLargestComponent = 1000;  ///< see infer/evidence.h: colour sums are bounded
+
+MatchModel make_model(const ReconstructOptions& options) {
+  MatchModel model;
+  const double noise = options.noise.value_or(default_noise(options.color_space));
+  for (float& variance : model.noise_variance) variance = static_cast<float>(noise * noise);
+  model.agreement = options.agreement;
+  const double default_scale = (options.agreement == Agreement::kLinear ? 5 : 2.5) * noise;
+  model.scale = static_cast<float>(options.agreement_scale.value_or(default_scale));
+  model.outlier = static_cast<float>(options.outlier);
+  model.uninformative =
+      static_cast<float>(options.uninformative.value_or(unknown_color_likelihood(options.color_space, noise)));
+  model.evidence_half = options.predictive ? static_cast<float>(options.evidence_half) : 0.0f;
+  return model;
+}
+
+BoundsOptions bounds_options(const ReconstructOptions& options) {
+  BoundsOptions bounds;
+  bounds.near = options.near;
+  bounds.far = options.far;
+  if (options.bounds) {
+    const auto& b = *options.bounds;
+    bounds.box = Eigen::AlignedBox3d(Eigen::Vector3d(b[0], b[1], b[2]), Eigen::Vector3d(b[3], b[4], b[5]));
+  }
+  return bounds;
+}
+
+/// Lattices around the box until the outermost reaches as far as any ray, each twice as large as the one within.
+int count_surround(const Dataset& dataset, const SceneBounds& bounds) {
+  double reach = 0;
+  for (std::size_t v = 0; v < dataset.views.size(); ++v)
+    reach = std::max(reach, (dataset.views[v].camera.pose.centre - bounds.box.center()).norm() + bounds.views[v].far);
+  const double half = 0.5 * bounds.box.sizes().maxCoeff();
+  return std::clamp(static_cast<int>(std::ceil(std::log2(reach / half))), 1, kMostSurround);
+}
+
+/// Luminances of a thin sample of the usable object pixels.
+std::vector<float> sample_luminance(const Photograph& photo) {
+  std::vector<float> luminances;
+  const std::size_t pixels = static_cast<std::size_t>(photo.rgb.width()) * photo.rgb.height();
+  const std::size_t stride = std::max<std::size_t>(1, pixels / 4096);
+  for (std::size_t i = stride / 2; i < pixels; i += stride) {
+    if (!photo.valid.empty() && photo.valid.data()[i] == 0) continue;
+    if (!photo.foreground.empty() && photo.foreground.data()[i] < 128) continue;
+    const float* p = photo.rgb.data().data() + 3 * i;
+    luminances.push_back(0.2126f * p[0] + 0.7152f * p[1] + 0.0722f * p[2]);
+  }
+  return luminances;
+}
+
+/// 1 where nothing is brighter than display white; otherwise the scale that brings the median to middle grey.
+double choose_exposure(std::vector<float> luminances, std::vector<std::string>& notes) {
+  if (luminances.empty()) return 1;
+  const float brightest = *std::max_element(luminances.begin(), luminances.end());
+  if (brightest <= 1.001f) return 1;
+  const auto middle = luminances.begin() + luminances.size() / 2;
+  std::nth_element(luminances.begin(), middle, luminances.end());
+  const double exposure = std::max(1e-12, *middle / kMiddleGrey);
+  notes.push_back("exposure: radiance " + std::to_string(exposure) + " counts as white (high dynamic range images)");
+  return exposure;
+}
+
+Image matching_image(const Photograph& photo, const Scene& scene) {
+  Image samples = photo.rgb;
+  const float scale = static_cast<float>(1 / scene.exposure);
+  for (float& value : samples.data()) value *= scale;
+  scene.transform.from_rgb_in_place(samples.data().data(), samples.data().size() / 3);
+  for (float& value : samples.data()) value = std::clamp(value, -kLargestComponent, kLargestComponent);
+  return samples;
+}
+
+/// Width of a voxel in pixels at the depth of the box's centre (or half way to far, from inside the box).
+double footprint_px(const PinholeCamera& camera, const Scene& scene, double voxel_size, const Stretch& range) {
+  const double centre_depth = camera.camera_from_world(scene.bounds.box.center()).z();
+  const bool outside = !scene.bounds.box.contains(camera.pose.centre) && centre_depth > 0;
+  const double depth = outside ? centre_depth : 0.5 * range.end;
+  return 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy) * voxel_size / depth;
+}
+
+}  // namespace
+
+Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options) {
+  reconstruct_option_table().validate(options);
+  Scene scene;
+  scene.bounds = default_bounds(dataset, bounds_options(options));
+  if (!options.bounds && load) {
+    const Eigen::AlignedBox3d tightened = tighten_by_masks(scene.bounds.box, dataset, load);
+    if (!tightened.isApprox(scene.bounds.box)) scene.bounds.how += "; tightened by masks";
+    scene.bounds.box = tightened;
+  }
+  const double longest = scene.bounds.box.sizes().maxCoeff();
+  scene.voxel_size = options.voxel_size.value_or(longest / options.resolution);
+  if (longest / scene.voxel_size > 65536)
+    throw_invalid("--voxel-size", std::to_string(longest / scene.voxel_size) + " voxels along the longest side",
+                  "at most 65536");
+  scene.notes.push_back("bounds: " + scene.bounds.how);
+  scene.transform = ColorTransform(options.color_space, parse_white_point(options.white_point, "--white-point"));
+  scene.model = make_model(options);
+  scene.background.unknown_likelihood = static_cast<float>(
+      unknown_color_likelihood(options.color_space, std::sqrt(scene.model.noise_variance[0])));
+  return scene;
+}
+
+Scene survey(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
+             const RunContext& context) {
+  Scene scene = lay_out(dataset, load, options);
+  std::vector<std::vector<float>> luminances(dataset.views.size());
+  std::vector<BorderSample> borders(dataset.views.size());
+  parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
+    context.throw_if_cancelled();
+    const Photograph photo = load(dataset.views[v]);
+    luminances[v] = sample_luminance(photo);
+    borders[v] = sample_border(photo, scene);
+  });
+  std::vector<float> all;
+  for (const auto& part : luminances) all.insert(all.end(), part.begin(), part.end());
+  scene.exposure = choose_exposure(std::move(all), scene.notes);
+  choose_background(borders, options, scene);
+  const bool ends_unknown =
+      scene.background.kind == BackgroundKind::kUnknown || scene.background.kind == BackgroundKind::kNone;
+  const bool surround = options.surround == SurroundChoice::kOn || (options.surround == SurroundChoice::kAuto && ends_unknown);
+  scene.surround_count = surround ? count_surround(dataset, scene.bounds) : 0;
+  if (surround) scene.notes.push_back("surround: " + std::to_string(scene.surround_count) + " lattices around the box");
+  return scene;
+}
+
+std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options) {
+  return nested_frames(scene.bounds.box, std::ldexp(scene.voxel_size, options.levels - 1), scene.surround_count);
+}
+
+Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx) {
+  Stretch range{scene.bounds.views[view_idx].near, scene.bounds.views[view_idx].far};
+  if (scene.surround_count > 0) return range;
+  double farthest = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto type = static_cast<Eigen::AlignedBox3d::CornerType>(corner);
+    farthest = std::max(farthest, dataset.views[view_idx].camera.camera_from_world(scene.bounds.box.corner(type)).z());
+  }
+  range.end = std::max(range.begin, std::min(range.end, 1.01 * farthest + scene.voxel_size));
+  return range;
+}
+
+std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
+                                     double voxel_size, const ReconstructOptions& options, const RunContext& context) {
+  std::vector<SampleView> views(dataset.views.size());
+  parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
+    context.throw_if_cancelled();
+    SampleView& view = views[v];
+    view.camera = dataset.views[v].camera;
+    SamplePlanOptions plan_options;
+    plan_options.samples_per_voxel = options.samples_per_voxel;
+    plan_options.adaptive = options.adaptive;
+    view.plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size, view_range(scene, dataset, v), plan_options);
+    const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
+    view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
+    const Photograph photo = load(dataset.views[v]);
+    view.pyramid = std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground,
+                                                   view.plan.finest_level, view.plan.root_level);
+  });
+  std::vector<SampleNode> nodes(dataset.nodes.size());
+  for (std::size_t v = 0; v < views.size(); ++v) nodes[dataset.views[v].node_idx].push_back(std::move(views[v]));
+  return nodes;
+}
+
+SampleView make_full_view(const Dataset& dataset, int view_idx, const Photograph& photo, const Scene& scene) {
+  SampleView view;
+  view.camera = dataset.views[view_idx].camera;
+  view.plan.range = view_range(scene, dataset, view_idx);
+  view.pyramid = std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground, 0, 0);
+  return view;
+}
+
+}  // namespace roxel

@@ -1,0 +1,42 @@
+#pragma once
+/// What is decided once about a data set, before the first pass: box, scales, colours, background.
+
+#include "roxel/base/run_context.h"
+#include "roxel/dataset/bounds.h"
+#include "roxel/solve/options.h"
+
+namespace roxel {
+
+struct Scene {
+  SceneBounds bounds;
+  double voxel_size = 0;         ///< finest level, world units
+  int surround_count = 0;        ///< lattices around the box
+  ColorTransform transform;      ///< linear RGB / exposure <-> matching space
+  double exposure = 1;           ///< radiance that counts as display white; 1 for 8- and 16-bit images
+  MatchModel model;
+  Background background;
+  std::vector<std::string> notes;     ///< what was chosen and why, for people
+};
+
+/// Reads every image once. Throws InvalidInput for options that do not fit the data set.
+Scene survey(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
+             const RunContext& context);
+
+/// The box, far distances and voxel size alone: no image is read (masks are, where they tighten the box and
+/// `load` is given). For `roxel info` and dry runs, and the first step of survey().
+Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options);
+
+/// The frames of a level's lattices: box first, then surround. `level` is 0 for the coarsest.
+std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options);
+
+/// Loads all views, and prepares their samples for voxels of `voxel_size`.
+std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
+                                     double voxel_size, const ReconstructOptions& options, const RunContext& context);
+
+/// One view in the matching space, all pixels: what depth and error maps are made from.
+SampleView make_full_view(const Dataset& dataset, int view_idx, const Photograph& photo, const Scene& scene);
+
+/// The depths that rays of a view cover.
+Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx);
+
+}  // namespace roxel

@@ -1,0 +1,55 @@
+#pragma once
+/// What a reconstruction did, why it stopped and what it cost.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace roxel {
+
+struct PassRecord {
+  int level = 0;  ///< 1-based
+  int pass = 0;   ///< 1-based
+  std::int64_t active_voxels = 0;
+  std::int64_t rays = 0;   ///< samples of the opacity march
+  std::int64_t steps = 0;  ///< ray-voxel steps of the opacity march: existing voxels crossed
+  std::int64_t color_steps = 0;
+  double mean_log_likelihood = 0;  ///< per observation
+  double mean_opacity_change = 0;
+  double mean_opacity = 0;
+  double seconds = 0;          ///< wall time of the pass
+  double color_seconds = 0;
+  double opacity_seconds = 0;  ///< wall time of the opacity half, the node's own colours included
+  double ns_per_step = 0;      ///< of the opacity march alone, per core
+};
+
+struct LevelRecord {
+  double voxel_size = 0;
+  std::int64_t voxels_in_box = 0;
+  std::int64_t voxels_around = 0;
+  bool converged = false;  ///< the mean opacity change fell below the tolerance
+  double seconds = 0;      ///< images, topology and passes
+};
+
+struct StageRecord {
+  std::string name;
+  double seconds = 0;
+};
+
+struct Summary {
+  std::string termination;  ///< "converged", "pass limit" or "interrupted"
+  std::vector<LevelRecord> levels;
+  std::vector<PassRecord> passes;
+  std::vector<StageRecord> stages;
+  std::vector<std::string> notes;
+  double seconds = 0;
+  std::int64_t peak_memory_bytes = 0;  ///< of the process so far
+
+  /// One line for a person.
+  std::string brief() const;
+};
+
+/// Peak resident memory of this process, in bytes.
+std::int64_t peak_memory_bytes();
+
+}  // namespace roxel
