@@ -5,13 +5,14 @@
 #   make build    build everything
 #   make bench    build and run the benchmarks
 #   make format   format the sources
+#   make docs     write docs/options.md anew from the options table
 #
 # PRESET=dev|release|asan|tsan picks the build (folder build/PRESET); JOBS=N limits parallel jobs.
 PRESET ?= release
 JOBS ?= $(shell nproc)
 export ROXEL_COMPILER_LAUNCHER ?= $(shell command -v ccache)
 
-.PHONY: all setup configure build test demo bench format clean
+.PHONY: all setup configure build test demo bench format docs clean
 all: build
 
 setup:
@@ -39,6 +40,10 @@ bench:
 format:
 	tools/setup.sh dev
 	tools/format.sh
+
+docs: configure
+	cmake --build --preset $(PRESET) -j $(JOBS) --target docs_test
+	ROXEL_UPDATE_DOCS=1 build/$(PRESET)/tests/docs_test
 
 clean:
 	rm -rf build/$(PRESET)

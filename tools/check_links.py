@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that relative links in the project's Markdown lead to files, and that every [Key00] cited in
-sources and docs stands in docs/bibliography.md.
+"""Checks that relative links in the project's Markdown lead to files, that sources name docs pages that
+exist, and that every [Key00] cited in sources and docs stands in docs/bibliography.md.
 
     tools/check_links.py [REPOSITORY]
 """
@@ -10,6 +10,7 @@ import re
 import sys
 
 LINK = re.compile(r"\]\(([^)\s#]+)(?:#[^)]*)?\)")
+PAGE = re.compile(r"\bdocs/[\w-]+\.md\b")
 KEY = re.compile(r"\[([A-Z][A-Za-z]+[0-9]{2}[a-z]?)\](?!\()")
 ENTRY = re.compile(r"\*\*\[([A-Za-z0-9]+)\]\*\*")
 SKIP = {"build", "shared", ".git", "demo", "node_modules"}
@@ -33,6 +34,14 @@ def broken_links(root):
                     yield f"{path.relative_to(root)}:{number}: no such file: {target}"
 
 
+def missing_pages(root):
+    for path in files(root, ".h", ".cc"):
+        for number, line in lines(path):
+            for page in PAGE.findall(line):
+                if not (root / page).exists():
+                    yield f"{path.relative_to(root)}:{number}: no such page: {page}"
+
+
 def unknown_keys(root):
     known = set(ENTRY.findall((root / "docs/bibliography.md").read_text(encoding="utf-8")))
     for path in files(root, ".md", ".h", ".cc"):
@@ -44,7 +53,7 @@ def unknown_keys(root):
 
 def main():
     root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parent.parent)
-    found = [*broken_links(root), *unknown_keys(root)]
+    found = [*broken_links(root), *missing_pages(root), *unknown_keys(root)]
     print(*found, f"links: {len(found)} broken", sep="\n")
     return 1 if found else 0
 

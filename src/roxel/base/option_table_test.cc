@@ -356,7 +356,7 @@ TEST(OptionTable, SpellsFlagsSoThatTheyChangeTheDefault) {
 TEST(OptionTable, RendersMarkdown) {
   const std::string page = kTable.markdown();
   EXPECT_THAT(page, HasSubstr("### Volume\n\n| option | default |"));
-  EXPECT_THAT(page, HasSubstr("| `--no-adaptive` | on |  | Sample where there is detail |  |\n"));
+  EXPECT_THAT(page, HasSubstr("| `--no-adaptive` | adaptive is on |  | Sample where there is detail |  |\n"));
   EXPECT_THAT(page,
               HasSubstr("| `--voxel-size NUMBER` | 0.25 | a number > 0 (world units) | Finest edge |  |\n"));
   EXPECT_THAT(page, HasSubstr("| `--near NUMBER` | from the cameras | a number > 0 | Nearest |  |\n"));
