@@ -56,8 +56,11 @@ std::string markdown_row(const OptionField& field) {
   const std::string value = field.is_switch() ? "" : " " + placeholder_of(field);
   const std::string unit = field.unit.empty() ? "" : " (" + field.unit + ")";
   std::string row = "|";
+  // "--no-adaptive | on" would leave the reader to guess which of the two is on.
+  const bool negated = field.is_switch() && field.default_value == OptionValue(true);
+  const std::string at_first = negated ? field.name + " is on" : field.default_text();
   for (const std::string& cell :
-       {"`" + field.flag() + value + "`", field.default_text(),
+       {"`" + field.flag() + value + "`", at_first,
         field.is_switch() ? std::string() : field.expected() + unit, field.help, field.source})
     row += " " + markdown_cell(cell) + " |";
   return row + "\n";
