@@ -11,10 +11,12 @@ namespace roxel {
 namespace {
 
 constexpr std::size_t kFewestPoints = 20;
-constexpr int kTrustedTrack = 3;            // views that see a point before it is trusted
-constexpr double kPointPercentile = 0.005;  // cut at both ends: outliers of structure from motion
-constexpr double kPointMargin = 0.1;        // of the extent: what the percentiles and sparse sampling miss
-constexpr double kMaskedQuorum = 0.25;      // share of the nodes that see what the masks then tighten
+constexpr std::size_t kMostPoints = 20000;     // more of them tell a box little
+constexpr std::size_t kMostVotingNodes = 300;  // nor do more nodes
+constexpr int kTrustedTrack = 3;               // views that see a point before it is trusted
+constexpr double kPointPercentile = 0.005;     // cut at both ends: outliers of structure from motion
+constexpr double kPointMargin = 0.1;           // of the extent: what the percentiles and sparse sampling miss
+constexpr double kMaskedQuorum = 0.25;         // share of the nodes that see what the masks then tighten
 constexpr double kPointQuorum = 0.4;      // share of the nodes that look at what outside-in points may bound
 constexpr double kNearShare = 0.5;        // of the depth at which the box, or what is known, begins
 constexpr double kSurroundDiagonals = 3;  // how far rays go on behind the box
@@ -46,14 +48,41 @@ void check_options(const BoundsOptions& options) {
   }
 }
 
+/// At most `most` of the elements, evenly chosen.
+template <class T>
+std::vector<T> thinned(const std::vector<T>& all, std::size_t most) {
+  if (all.size() <= most) return all;
+  std::vector<T> chosen;
+  for (std::size_t i = 0; i < most; ++i) chosen.push_back(all[i * all.size() / most]);
+  return chosen;
+}
+
+/// The nodes, or an even choice of them, with their views: what a box is voted by.
+Dataset voting_part(const Dataset& dataset) {
+  Dataset part;
+  part.path = dataset.path;
+  for (Node node : thinned(dataset.nodes, kMostVotingNodes)) {
+    for (int& view_idx : node.view_idxs) {
+      part.views.push_back(dataset.views[view_idx]);
+      view_idx = static_cast<int>(part.views.size()) - 1;
+    }
+    part.nodes.push_back(std::move(node));
+  }
+  part.points = dataset.points;
+  part.point_view_counts = dataset.point_view_counts;
+  part.scene_bounds = dataset.scene_bounds;
+  return part;
+}
+
 /// Points with long enough tracks, if they are still enough; otherwise all.
 std::vector<Eigen::Vector3d> trusted_points(const Dataset& dataset) {
-  if (dataset.point_view_counts.size() != dataset.points.size()) return dataset.points;
+  if (dataset.point_view_counts.size() != dataset.points.size()) return thinned(dataset.points, kMostPoints);
   std::vector<Eigen::Vector3d> trusted;
   for (std::size_t i = 0; i < dataset.points.size(); ++i) {
     if (dataset.point_view_counts[i] >= kTrustedTrack) trusted.push_back(dataset.points[i]);
   }
-  return trusted.size() >= std::max(kFewestPoints, dataset.points.size() / 4) ? trusted : dataset.points;
+  const bool enough = trusted.size() >= std::max(kFewestPoints, dataset.points.size() / 4);
+  return thinned(enough ? trusted : dataset.points, kMostPoints);
 }
 
 /// Where the cameras look at one place, the points of the background do not count.
@@ -186,7 +215,7 @@ SceneBounds default_bounds(const Dataset& dataset, const BoundsOptions& options)
   check_options(options);
   const CameraRig rig = describe_cameras(dataset);
   SceneBounds bounds;
-  choose_box(dataset, options, rig, bounds);
+  choose_box(voting_part(dataset), options, rig, bounds);
   const bool stated = options.box || (options.use_scene_bounds && dataset.scene_bounds);
   if (!stated && options.load_masks && has_masks(dataset)) {
     bounds.box = tighten_by_masks(bounds.box, dataset, options.load_masks);
