@@ -18,7 +18,10 @@ namespace {
 /// 1/x - (1 - a)/a for a = 1 - exp(-x): from 1/2 at x = 0 down to 0.
 inline __attribute__((always_inline)) float mean_path_core(float x, float a) {
   const float series = 0.5f - x * (1.0f / 12 - x * x * (1.0f / 720));
-  const float exact = 1.0f / (x + 1e-30f) - (1.0f - a) / (a + 1e-30f);
+  // Kept away from 0, where the difference of the two large terms would lose its digits; the series serves there.
+  const float safe_x = x > 0.25f ? x : 0.25f;
+  const float safe_a = a > 0.22119922f ? a : 0.22119922f;
+  const float exact = 1.0f / safe_x - (1.0f - safe_a) / safe_a;
   return x < 0.5f ? series : exact;
 }
 

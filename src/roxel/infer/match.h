@@ -20,8 +20,6 @@ struct MatchModel {
   Agreement agreement = Agreement::kGaussian;
   float noise_variance[3] = {16, 16, 16};  ///< diagonal of S_min, in the matching space
   float scale = 10;                        ///< of the exponential and linear baselines, matching-space units
-  bool first_channel_wraps = false;        ///< hue: differences are taken the short way round
-  float wrap_period = 1;
   float evidence_half = 0.2f;              ///< w_0: evidence at which a voxel's own colour counts half
   float uninformative = 0.001f;            ///< p_0: likelihood where there is no evidence
   float outlier = 1e-7f;                   ///< floor of every likelihood
@@ -55,11 +53,14 @@ void evaluate_match(const MatchModel& model, const SampleTerms& sample, int coun
 /// Agreement of two Gaussians in (0, 1] (or the baseline's value), one pair at a time; the slow twin of the block.
 float agreement(const MatchModel& model, const float mean_difference[3], const float cov_sum_plus_noise[6]);
 
-/// exp(x) for x <= 0, relative error below 1e-6; 0 below -87. Range reduction to 2^n 2^f, |f| <= 1/2, and the
-/// series of 2^f to degree 6. Plain arithmetic, so that loops around it vectorise.
-inline __attribute__((always_inline)) float exp_negative(float x) {
-  const float clamped = x < -87.0f ? -87.0f : x;
-  const float y = clamped * 1.44269504088896341f;
+namespace internal {
+
+/// 2^n and 2^f - 1 for y = n + f <= 0 with |f| <= 1/2, by the series of 2^f - 1 to degree 6.
+struct PowerOfTwo {
+  float whole;
+  float fraction_less_one;
+};
+inline __attribute__((always_inline)) PowerOfTwo power_of_two(float y) {
   const int n = static_cast<int>(y - 0.5f);  // y <= 0: truncation rounds to the nearest
   const float f = y - static_cast<float>(n);
   float s = 1.540353039e-4f;
@@ -68,16 +69,23 @@ inline __attribute__((always_inline)) float exp_negative(float x) {
   s = s * f + 5.550410866e-2f;
   s = s * f + 2.402265070e-1f;
   s = s * f + 6.931471806e-1f;
-  s = s * f + 1.0f;
-  const float power = std::bit_cast<float>((n + 127) << 23);
-  return x < -87.0f ? 0.0f : s * power;
+  return {std::bit_cast<float>((n + 127) << 23), s * f};
 }
 
-/// 1 - exp(-x) for x >= 0, relative error below 2e-6.
+}  // namespace internal
+
+// Plain arithmetic without branches, so that the loops around these vectorise.
+
+/// exp(x) for x <= 0, relative error below 1e-6; exp(-87), about 1.6e-38, below -87.
+inline __attribute__((always_inline)) float exp_negative(float x) {
+  const auto power = internal::power_of_two((x < -87.0f ? -87.0f : x) * 1.44269504088896341f);
+  return power.whole * power.fraction_less_one + power.whole;
+}
+
+/// 1 - exp(-x) for x >= 0, relative error below 1e-6, small x too.
 inline __attribute__((always_inline)) float one_minus_exp(float x) {
-  const float series =
-      x * (1.0f - x * (0.5f - x * (1.0f / 6 - x * (1.0f / 24 - x * (1.0f / 120 - x * (1.0f / 720))))));
-  return x < 0.25f ? series : 1.0f - exp_negative(-x);
+  const auto power = internal::power_of_two((x > 87.0f ? -87.0f : -x) * 1.44269504088896341f);
+  return (1.0f - power.whole) - power.whole * power.fraction_less_one;
 }
 
 }  // namespace roxel

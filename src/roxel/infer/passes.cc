@@ -48,7 +48,7 @@ class ColorMarch {
 
  private:
   static constexpr float kOpaque = 1e-4f;
-  static constexpr int kChunk = 32;
+  static constexpr float kNothing = 1e-7f;  ///< weights that cannot matter against evidence of order 1
 
   float deposit(const SampleView& view, const Region& region, const RegionStats& sample, Stretch range,
                 float transmittance) {
@@ -62,32 +62,32 @@ class ColorMarch {
     second[4] = sample.cov[4] + sample.mean[0] * sample.mean[2];
     second[5] = sample.cov[5] + sample.mean[1] * sample.mean[2];
     ++counts.rays;
-    VoxelStep chunk[kChunk];
-    int filled = 0;
-    const auto flush = [&] {
-      for (int i = 0; i < filled; ++i) {
-        VoxelScratch& voxel = scratch_[chunk[i].slot];
-        const float a = everywhere_ ? 1.0f : one_minus_exp(voxel.tau * chunk[i].length);
-        const float w = (everywhere_ ? 1.0f : a * transmittance) * chunk[i].weight * weight;
-        if (!everywhere_) transmittance *= 1 - a;
-        if (w < 1e-9f) continue;
-        voxel.evidence += w;
-        for (int c = 0; c < 3; ++c) voxel.mean[c] += w * sample.mean[c];
-        for (int c = 0; c < 6; ++c) voxel.cov[c] += w * second[c];
+    stack_.walk_chunks(region_ray(view, region), range, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
+                       [&](const StepChunk& chunk) {
+                         counts.steps += chunk.count;
+                         transmittance = add_to_voxels(chunk, sample.mean, second, weight, transmittance);
+                         return everywhere_ || transmittance > kOpaque;
+                       });
+    return transmittance;
+  }
+
+  float add_to_voxels(const StepChunk& chunk, const float mean[3], const float second[6], float weight,
+                      float transmittance) {
+    for (int i = 0; i < chunk.count; ++i) __builtin_prefetch(&scratch_[chunk.slot[i]], 1);
+    for (int i = 0; i < chunk.count; ++i) {
+      VoxelScratch& voxel = scratch_[chunk.slot[i]];
+      float responsibility = 1;
+      if (!everywhere_) {
+        const float a = one_minus_exp(voxel.tau * chunk.length[i]);
+        responsibility = a * transmittance;
+        transmittance *= 1 - a;
       }
-      counts.steps += filled;
-      filled = 0;
-      return everywhere_ || transmittance > kOpaque;
-    };
-    bool running = true;
-    stack_.walk(region_ray(view, region), range, [&](std::uint32_t brick) { scratch_.enter(brick); },
-                [&](const VoxelStep& step, const VoxelPlace&) {
-                  __builtin_prefetch(&scratch_[step.slot], 1);
-                  chunk[filled++] = step;
-                  if (filled == kChunk) running = flush();
-                  return running;
-                });
-    flush();
+      const float w = responsibility * chunk.weight[i] * weight;
+      if (w < kNothing) continue;
+      voxel.evidence += w;
+      for (int c = 0; c < 3; ++c) voxel.mean[c] += w * mean[c];
+      for (int c = 0; c < 6; ++c) voxel.cov[c] += w * second[c];
+    }
     return transmittance;
   }
 
@@ -96,6 +96,7 @@ class ColorMarch {
   const Background& background_;
   bool everywhere_;
   NodeScratch& scratch_;
+  StepChunk chunk_;
 };
 
 /// One sample of the tree that a root sample divides into: its own stretch of steps and what its children add.

@@ -38,80 +38,78 @@ Segment SegmentMarch::march(const SampleView& view, const Region& region, const 
   RegionStats sample = sample_seen;
   if (filters_.background && background_.kind == BackgroundKind::kKnown)
     sample = background_removed(view, ray, sample);
-  const int chunk = filters_.rays ? 1 : MatchBlock::kSize;
   Segment total;
   in_brick_ = {};
-  pending_count_ = 0;
-  bool next_starts_brick = false, running = true;
-  const double norm = ray.direction.norm();
-  stack_.walk(
-      ray, range,
-      [&](std::uint32_t brick) {
-        scratch_.enter(brick);
-        next_starts_brick = true;
-      },
-      [&](const VoxelStep& step, const VoxelPlace& place) {
-        __builtin_prefetch(&scratch_[step.slot]);
-        const LatticeFrame& frame = stack_.volume().index(place.lattice).frame();
-        half_chord_[pending_count_] = static_cast<float>(0.5 * step.length * frame.voxel_size / norm);
-        if (filters_.interpolate) centre_[pending_count_] = place.centre(frame);
-        brick_start_[pending_count_] = next_starts_brick;
-        next_starts_brick = false;
-        pending_[pending_count_++] = step;
-        if (pending_count_ == chunk) running = flush(view, region, sample, removed, total, steps);
+  bool running = true;
+  stack_.walk_chunks(
+      ray, range, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
+      [&](const StepChunk& chunk) {
+        running = flush(view, region, sample, chunk, removed, total, steps);
         return running;
-      });
-  if (running) flush(view, region, sample, removed, total, steps);
+      },
+      filters_.rays ? 1 : MatchBlock::kSize);
   return total.then(in_brick_);
 }
 
-bool SegmentMarch::flush(const SampleView& view, const Region& region, const RegionStats& sample,
-                         RemovedColor& removed, Segment& total, std::vector<EvaluatedStep>& steps) {
-  const int count = pending_count_;
-  pending_count_ = 0;
-  if (count == 0) return true;
-  const SampleTerms terms = sample_terms(filters_.rays ? removed.apply(sample) : sample, model_);
-
-  // Gather what the scratch knows about the voxels.
-  for (int i = 0; i < count; ++i) {
-    const VoxelScratch& voxel = scratch_[pending_[i].slot];
-    float mean[3] = {terms.mean[0], terms.mean[1], terms.mean[2]};
-    if (filters_.interpolate) {
-      const Eigen::Vector3d at = view.camera.project(centre_[i]);
-      view.pyramid->bilinear(region.level, at.x(), at.y(), mean);
-    }
-    for (int c = 0; c < 3; ++c) block_.diff[c][i] = voxel.mean[c] - mean[c];
+void SegmentMarch::gather(const SampleView& view, const Region& region, const SampleTerms& terms,
+                          const StepChunk& chunk) {
+  const float mean0 = terms.mean[0], mean1 = terms.mean[1], mean2 = terms.mean[2];
+  for (int i = 0; i < chunk.count; ++i) {
+    const VoxelScratch& voxel = scratch_[chunk.slot[i]];
+    block_.diff[0][i] = voxel.mean[0] - mean0;
+    block_.diff[1][i] = voxel.mean[1] - mean1;
+    block_.diff[2][i] = voxel.mean[2] - mean2;
     for (int c = 0; c < 6; ++c) block_.cov[c][i] = voxel.cov[c];
     block_.evidence[i] = voxel.evidence;
     block_.tau[i] = voxel.tau;
-    block_.length[i] = pending_[i].length;
+    block_.length[i] = chunk.length[i];
   }
-  if (model_.first_channel_wraps)
-    for (int i = 0; i < count; ++i)
-      block_.diff[0][i] -= model_.wrap_period * std::round(block_.diff[0][i] / model_.wrap_period);
+  if (!filters_.interpolate) return;
+  const LatticeFrame& frame = stack_.volume().index(chunk.lattice).frame();
+  for (int i = 0; i < chunk.count; ++i) {
+    const Eigen::Vector3d at = view.camera.project(chunk.voxel_centre(frame, i));
+    float mean[3];
+    if (!view.pyramid->bilinear(region.level, at.x(), at.y(), mean)) continue;
+    for (int c = 0; c < 3; ++c) block_.diff[c][i] += terms.mean[c] - mean[c];
+  }
+}
 
+bool SegmentMarch::flush(const SampleView& view, const Region& region, const RegionStats& sample,
+                         const StepChunk& chunk, RemovedColor& removed, Segment& total,
+                         std::vector<EvaluatedStep>& steps) {
+  const int count = chunk.count;
+  for (int i = 0; i < count; ++i) __builtin_prefetch(&scratch_[chunk.slot[i]]);
+  const SampleTerms terms = sample_terms(filters_.rays ? removed.apply(sample) : sample, model_);
+  gather(view, region, terms, chunk);
   evaluate_match(model_, terms, count, block_);
 
-  // Fold in ray order, brick by brick.
-  for (int i = 0; i < count; ++i) {
-    if (brick_start_[i]) {
+  // Fold in ray order, brick by brick; stop where a fresh brick could no longer change the likelihood.
+  const std::size_t first = steps.size();
+  steps.resize(first + count);
+  EvaluatedStep* step = steps.data() + first;
+  int kept = 0;
+  bool running = true;
+  for (; kept < count; ++kept, ++step) {
+    const int i = kept;
+    if (chunk.brick_start[i]) {
       total = total.then(in_brick_);
       in_brick_ = {};
-      if (early_stop_ && total.transmittance < kNegligible * total.likelihood) return false;
+      if (early_stop_ && total.transmittance < kNegligible * total.likelihood) {
+        running = false;
+        break;
+      }
     }
-    in_brick_.append(block_.opacity[i], block_.likelihood[i]);
-    steps.push_back({pending_[i].slot, block_.length[i], pending_[i].weight, pending_[i].depth, half_chord_[i],
-                     block_.opacity[i], block_.likelihood[i], block_.mean_path[i]});
+    const float a = block_.opacity[i], p = block_.likelihood[i];
+    in_brick_.append(a, p);
+    *step = {chunk.slot[i], block_.length[i], chunk.weight[i], chunk.depth[i],
+             0.5f * chunk.length[i] * chunk.depth_per_length, a, p, block_.mean_path[i]};
     if (filters_.rays) {
-      const VoxelScratch& voxel = scratch_[pending_[i].slot];
-      removed.remove(block_.opacity[i], voxel.mean, voxel.cov, filters_.limit);
+      const VoxelScratch& voxel = scratch_[chunk.slot[i]];
+      removed.remove(a, voxel.mean, voxel.cov, filters_.limit);
     }
   }
-  if (early_stop_) {
-    const Segment now = total.then(in_brick_);
-    if (now.transmittance < kNegligible * now.likelihood) return false;
-  }
-  return true;
+  steps.resize(first + kept);
+  return running;
 }
 
 }  // namespace roxel

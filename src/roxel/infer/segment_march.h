@@ -58,8 +58,9 @@ class SegmentMarch {
   static constexpr float kNegligible = 1e-4f;
 
  private:
-  bool flush(const SampleView& view, const Region& region, const RegionStats& sample, RemovedColor& removed,
-             Segment& total, std::vector<EvaluatedStep>& steps);
+  bool flush(const SampleView& view, const Region& region, const RegionStats& sample, const StepChunk& chunk,
+             RemovedColor& removed, Segment& total, std::vector<EvaluatedStep>& steps);
+  void gather(const SampleView& view, const Region& region, const SampleTerms& terms, const StepChunk& chunk);
   RegionStats background_removed(const SampleView& view, const Ray& ray, const RegionStats& sample);
 
   const LatticeStack& stack_;
@@ -69,12 +70,8 @@ class SegmentMarch {
   const SampleFilters& filters_;
   bool early_stop_ = true;
 
+  StepChunk chunk_;
   MatchBlock block_;
-  VoxelStep pending_[MatchBlock::kSize];
-  float half_chord_[MatchBlock::kSize];
-  bool brick_start_[MatchBlock::kSize];
-  Eigen::Vector3d centre_[MatchBlock::kSize];
-  int pending_count_ = 0;
   Segment in_brick_;  ///< the segment of the brick being walked
 };
 

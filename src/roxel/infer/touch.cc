@@ -84,7 +84,7 @@ class Toucher {
         return true;
       };
       const auto all = [](int) { return true; };
-      return walk_cells(frames_[lattice], ray, stretch, enter, all, [&](int packed, double, double) {
+      return walk_cells(frames_[lattice], ray, stretch, enter, all, [&](int packed, std::int64_t, std::int64_t) {
         const int voxel = internal::packed_voxel(packed);
         std::atomic<std::uint64_t>& word = brick->words[voxel / 64];
         const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);

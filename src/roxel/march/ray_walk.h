@@ -5,6 +5,7 @@
 /// Depths are in units of the ray's direction: distance along the optical axis for rays of PinholeCamera::ray.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -35,8 +36,8 @@ struct VoxelPlace {
 
 /// A stretch of depths, empty where end <= begin.
 struct Stretch {
-  double begin = 0;
-  double end = 0;
+  double begin;
+  double end;
 };
 
 /// Depths at which the ray is inside the box (slab method); empty where it misses.
@@ -67,12 +68,16 @@ inline int packed_voxel(int p) { return (p & 7) | (p >> 1 & 0x38) | (p >> 2 & 0x
 
 }  // namespace internal
 
+/// Positions along a ray inside walk_cells are integers: 2^-24 voxel lengths from the ray's origin. Integer
+/// compares and adds make the walk's chain of dependent steps short, and do not depend on where a walk begins.
+inline constexpr double kWalkUnit = 1.0 / (1 << 24);
+
 /// Amanatides-Woo over the cells of one frame within `range`, which must lie inside the frame's box.
 /// `enter(bx, by, bz)` is asked once for each brick and says whether to visit its cells; `wanted(voxel)` says
-/// which cells of it, by voxel_in_brick; `visit(packed cell, in, out)` gets those with their depths and returns
-/// false to stop. Returns false when stopped. All decisions depend on the ray and the frame alone.
+/// which cells of it, by voxel_in_brick; `visit(packed cell, in, out)` gets those with their positions (in
+/// kWalkUnit) and returns false to stop. Returns false when stopped.
 template <class Enter, class Wanted, class Visit>
-bool walk_cells(const LatticeFrame& frame, const Ray& ray, Stretch range, Enter&& enter, Wanted&& wanted,
+inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame, const Ray& ray, Stretch range, Enter&& enter, Wanted&& wanted,
                 Visit&& visit) {
   const double inverse_size = 1 / frame.voxel_size;
   const double infinity = std::numeric_limits<double>::infinity();
@@ -87,9 +92,14 @@ bool walk_cells(const LatticeFrame& frame, const Ray& ray, Stretch range, Enter&
     cells[a] = frame.size_in_bricks[a] * kBrickSide;
   }
   const auto cell_at = [&](double t, int a) {
-    return std::clamp(static_cast<int>(std::floor(origin[a] + t * direction[a])), 0, cells[a] - 1);
+    return std::clamp(static_cast<int>(origin[a] + t * direction[a]), 0, cells[a] - 1);
   };
-  const int step_x = step[0], step_y = step[1] * 16, step_z = step[2] * 256;
+  const double fixed_scale = ray.direction.norm() * inverse_size / kWalkUnit;
+  constexpr double kFarthest = 1e18;
+  constexpr std::int64_t kNever = static_cast<std::int64_t>(kFarthest);
+  const auto fixed = [&](double at) { return static_cast<std::int64_t>(std::min(at * fixed_scale, kFarthest)); };
+  const std::int64_t delta_x = fixed(delta[0]), delta_y = fixed(delta[1]), delta_z = fixed(delta[2]);
+  const std::int64_t step_x = step[0], step_y = step[1] * 16, step_z = step[2] * 256;
   double t = range.begin;
   for (int a = 0; a < 3; ++a) cell[a] = cell_at(t, a);
   while (t < range.end) {
@@ -106,29 +116,29 @@ bool walk_cells(const LatticeFrame& frame, const Ray& ray, Stretch range, Enter&
     const double brick_end = std::min(std::max(brick_out, t), range.end);
     if (brick_end > t && enter(brick[0], brick[1], brick[2])) {
       const auto next_plane = [&](int a) {
-        return direction[a] != 0 ? (cell[a] + (step[a] > 0) - origin[a]) * inverse[a] : infinity;
+        return direction[a] != 0 ? fixed((cell[a] + (step[a] > 0) - origin[a]) * inverse[a]) : kNever;
       };
-      double next_x = next_plane(0), next_y = next_plane(1), next_z = next_plane(2);
-      const double delta_x = delta[0], delta_y = delta[1], delta_z = delta[2];
+      std::int64_t next_x = next_plane(0), next_y = next_plane(1), next_z = next_plane(2);
+      const std::int64_t end = fixed(brick_end);
+      std::int64_t in = fixed(t);
       int packed = internal::pack_cell(cell[0] & 7, cell[1] & 7, cell[2] & 7);
-      double in = t;
       while (true) {
-        double out;
-        int next_packed;
-        if (next_x < next_y && next_x < next_z) {
-          out = next_x, next_packed = packed + step_x, next_x += delta_x;
-        } else if (next_y < next_z) {
-          out = next_y, next_packed = packed + step_y, next_y += delta_y;
-        } else {
-          out = next_z, next_packed = packed + step_z, next_z += delta_z;
-        }
+        const std::int64_t first = next_x < next_y ? next_x : next_y;
+        const std::int64_t out = first < next_z ? first : next_z;
         if (wanted(internal::packed_voxel(packed))) {
-          const double end = std::min(out, brick_end);
-          if (end > in && !visit(packed, in, end)) return false;
+          const std::int64_t chord_end = out < end ? out : end;
+          if (chord_end > in && !visit(packed, in, chord_end)) return false;
         }
-        if (out >= brick_end || (next_packed & internal::kPackedOutside)) break;
-        in = std::max(in, out);
-        packed = next_packed;
+        // Branch-free: every axis whose plane is reached steps.
+        const std::int64_t x = -static_cast<std::int64_t>(next_x == out);
+        const std::int64_t y = -static_cast<std::int64_t>(next_y == out);
+        const std::int64_t z = -static_cast<std::int64_t>(next_z == out);
+        next_x += x & delta_x;
+        next_y += y & delta_y;
+        next_z += z & delta_z;
+        packed += static_cast<int>((x & step_x) + (y & step_y) + (z & step_z));
+        if (out >= end || (packed & internal::kPackedOutside)) break;
+        in = in > out ? in : out;
       }
     }
     // Step over the brick's face; the other coordinates are recomputed so that errors do not add up.
@@ -153,11 +163,15 @@ template <class OnSegment>
 void walk_lattices(const std::vector<Eigen::AlignedBox3d>& boxes, const Ray& ray, Stretch range,
                    OnSegment&& segment) {
   const int count = static_cast<int>(boxes.size());
-  constexpr int kMaxLattices = 64;
-  Stretch inside[kMaxLattices + 1];
+  const auto empty = [](const Stretch& r) { return r.end <= r.begin; };
+  if (count == 1) {
+    if (const Stretch only = clip_to_box(ray, boxes[0], range); !empty(only)) segment(0, only);
+    return;
+  }
+  constexpr int kMaxLattices = 32;
+  std::array<Stretch, kMaxLattices + 1> inside;
   for (int k = 0; k < count; ++k) inside[k + 1] = clip_to_box(ray, boxes[k], range);
   inside[0] = {1, 0};
-  const auto empty = [](const Stretch& r) { return r.end <= r.begin; };
   for (int k = count - 1; k >= 0; --k) {  // inwards
     const Stretch& outer = inside[k + 1];
     const Stretch& inner = inside[k];
@@ -174,15 +188,43 @@ void walk_lattices(const std::vector<Eigen::AlignedBox3d>& boxes, const Ray& ray
   }
 }
 
-/// Ray weight of a chord in cell (i, j, k): 1 - d / (sqrt(3)/2), d the distance of the ray's line from the cell's
-/// centre in voxel lengths. [Jethwa04] section 5.1.1.
-inline float ray_weight(const float origin[3], const float unit_direction[3], int i, int j, int k) {
-  const float x = i + 0.5f - origin[0], y = j + 0.5f - origin[1], z = k + 0.5f - origin[2];
-  const float along = x * unit_direction[0] + y * unit_direction[1] + z * unit_direction[2];
-  const float squared = x * x + y * y + z * z - along * along;
-  constexpr float kInverseVertexDistance = 1.1547005383792515f;
-  return std::max(0.0f, 1 - std::sqrt(std::max(0.0f, squared)) * kInverseVertexDistance);
-}
+/// A run of steps along one ray within one lattice, as arrays: what the inner loops gather and vectorise over.
+struct alignas(64) StepChunk {
+  static constexpr int kSize = 64;
+
+  int count = 0;
+  int lattice = 0;
+  std::uint32_t slot[kSize];
+  float length[kSize];        ///< chord, in voxel lengths of the lattice
+  float depth[kSize];         ///< of the chord's middle
+  float weight[kSize];        ///< ray weight
+  bool brick_start[kSize];    ///< first step in its brick: where segments break (docs/rays.md)
+  const Brick* brick[kSize];
+  int packed[kSize];          ///< the voxel in its brick, see internal::pack_cell
+  float depth_per_length;     ///< extent in depth of a chord of one voxel length
+
+  Eigen::Vector3d voxel_centre(const LatticeFrame& frame, int i) const {
+    return frame.voxel_centre(kBrickSide * brick[i]->coord + Eigen::Vector3i(internal::packed_i(packed[i]),
+                                                                             internal::packed_j(packed[i]),
+                                                                             internal::packed_k(packed[i])));
+  }
+
+  // From a point of the ray to the voxel's centre, in voxel lengths; set_weights turns it into weights.
+  float from_ray[3][kSize];
+  /// weight = 1 - d / (sqrt(3)/2), d the distance of the ray's line from the voxel's centre: 1 through the
+  /// centre, 0 through a vertex. [Jethwa04] section 5.1.1. `u` is the ray's unit direction.
+  void set_weights(const float u[3]) {
+    constexpr float kInverseVertexDistance = 1.1547005383792515f;
+    const float ux = u[0], uy = u[1], uz = u[2];
+    for (int i = 0; i < count; ++i) {
+      const float x = from_ray[0][i], y = from_ray[1][i], z = from_ray[2][i];
+      // A cross product: |p|^2 - (p u)^2 would lose the digits of d far from the stretch's middle.
+      const float cx = y * uz - z * uy, cy = z * ux - x * uz, cz = x * uy - y * ux;
+      const float d = std::sqrt(cx * cx + cy * cy + cz * cz) * kInverseVertexDistance;
+      weight[i] = d < 1 ? 1 - d : 0.0f;
+    }
+  }
+};
 
 /// What a walk needs of a volume, gathered once.
 class LatticeStack {
@@ -207,42 +249,83 @@ class LatticeStack {
     return volume_->index(lattice).bricks()[number - first_brick_[lattice]];
   }
 
-  /// Yields the existing voxels within `range`. `on_brick(number)` is called before the first voxel of each
-  /// existing brick; `visit(VoxelStep, VoxelPlace)` returns false to stop.
-  template <class OnBrick, class Visit>
-  void walk(const Ray& ray, Stretch range, OnBrick&& on_brick, Visit&& visit) const {
+  /// Yields the existing voxels within `range` in chunks. `on_brick(number)` is called before the first voxel of
+  /// each existing brick; `on_chunk(chunk)` gets at most `chunk_size` steps and returns false to stop.
+  template <class OnBrick, class OnChunk>
+  void walk_chunks(const Ray& ray, Stretch range, StepChunk& chunk, OnBrick&& on_brick, OnChunk&& on_chunk,
+                   int chunk_size = StepChunk::kSize) const {
+    const double norm = ray.direction.norm();
+    const Eigen::Vector3d unit = ray.direction / norm;
+    const float unit_f[3] = {static_cast<float>(unit.x()), static_cast<float>(unit.y()), static_cast<float>(unit.z())};
+    const auto hand_over = [&](int count) __attribute__((noinline)) {
+      chunk.count = count;
+      chunk.set_weights(unit_f);
+      return on_chunk(static_cast<const StepChunk&>(chunk));
+    };
     walk_lattices(boxes_, ray, range, [&](int lattice, Stretch stretch) {
       const BrickIndex& index = volume_->index(lattice);
       const LatticeFrame& frame = index.frame();
       const std::int32_t* table = index.table();
       const Brick* bricks = index.bricks().data();
       const int nx = frame.size_in_bricks.x(), ny = frame.size_in_bricks.y();
-      const double norm = ray.direction.norm();
       const double length_scale = norm / frame.voxel_size;
-      const Eigen::Vector3d local = (ray.origin - frame.origin) / frame.voxel_size;
-      const Eigen::Vector3d unit = ray.direction / norm;
-      const float unit_f[3] = {static_cast<float>(unit.x()), static_cast<float>(unit.y()), static_cast<float>(unit.z())};
+      // A point of the ray near the stretch: relative to it floats do.
+      const double middle = 0.5 * (stretch.begin + stretch.end);
+      const Eigen::Vector3d near = (ray.origin + middle * ray.direction - frame.origin) / frame.voxel_size;
       const Brick* brick = nullptr;
-      // A point of the ray near the brick, relative to it: small numbers, so floats do.
-      float near_origin[3];
+      const std::uint16_t* local = nullptr;
+      float brick_from_ray[3] = {0, 0, 0};
+      bool starts_brick = false;
+      chunk.lattice = lattice;
+      chunk.depth_per_length = static_cast<float>(1 / length_scale);
       const auto enter = [&](int bx, int by, int bz) {
         const std::int32_t found = table[bx + static_cast<std::size_t>(nx) * (by + static_cast<std::size_t>(ny) * bz)];
         if (found < 0) return false;
         brick = bricks + found;
-        const Eigen::Vector3d relative = local - kBrickSide * Eigen::Vector3d(bx, by, bz);
-        const double along = (Eigen::Vector3d::Constant(kBrickSide / 2) - relative).dot(unit);
-        for (int a = 0; a < 3; ++a) near_origin[a] = static_cast<float>(relative[a] + along * unit[a]);
+        local = brick->local.data();
+        brick_from_ray[0] = static_cast<float>(bx * kBrickSide + 0.5 - near.x());
+        brick_from_ray[1] = static_cast<float>(by * kBrickSide + 0.5 - near.y());
+        brick_from_ray[2] = static_cast<float>(bz * kBrickSide + 0.5 - near.z());
+        starts_brick = true;
         on_brick(first_brick_[lattice] + static_cast<std::uint32_t>(found));
         return true;
       };
-      const auto wanted = [&](int voxel) { return brick->local[voxel] != kNoVoxel; };
-      return walk_cells(frame, ray, stretch, enter, wanted, [&](int packed, double in, double out) {
-        const int i = internal::packed_i(packed), j = internal::packed_j(packed), k = internal::packed_k(packed);
-        const VoxelStep step{brick->first_slot + brick->local[internal::packed_voxel(packed)],
-                             static_cast<float>((out - in) * length_scale), ray_weight(near_origin, unit_f, i, j, k),
-                             static_cast<float>(0.5 * (in + out))};
-        return visit(step, VoxelPlace{lattice, brick, i, j, k});
-      });
+      const auto wanted = [&](int voxel) __attribute__((always_inline)) { return local[voxel] != kNoVoxel; };
+      const double depth_scale = 0.5 * kWalkUnit / length_scale;
+      int n = 0;
+      const auto visit = [&](int packed, std::int64_t in, std::int64_t out) __attribute__((always_inline)) {
+        chunk.slot[n] = brick->first_slot + local[internal::packed_voxel(packed)];
+        chunk.length[n] = static_cast<float>(static_cast<double>(out - in) * kWalkUnit);
+        chunk.depth[n] = static_cast<float>(static_cast<double>(in + out) * depth_scale);
+        chunk.from_ray[0][n] = brick_from_ray[0] + static_cast<float>(internal::packed_i(packed));
+        chunk.from_ray[1][n] = brick_from_ray[1] + static_cast<float>(internal::packed_j(packed));
+        chunk.from_ray[2][n] = brick_from_ray[2] + static_cast<float>(internal::packed_k(packed));
+        chunk.brick_start[n] = starts_brick;
+        chunk.brick[n] = brick;
+        chunk.packed[n] = packed;
+        starts_brick = false;
+        if (++n < chunk_size) return true;
+        n = 0;
+        return hand_over(chunk_size);
+      };
+      if (!walk_cells(frame, ray, stretch, enter, wanted, visit)) return false;
+      return n == 0 || hand_over(n);
+    });
+  }
+
+  /// The same one step at a time: `visit(VoxelStep, VoxelPlace)`. For those who need no speed.
+  template <class OnBrick, class Visit>
+  void walk(const Ray& ray, Stretch range, OnBrick&& on_brick, Visit&& visit) const {
+    StepChunk chunk;
+    walk_chunks(ray, range, chunk, on_brick, [&](const StepChunk& steps) {
+      for (int n = 0; n < steps.count; ++n) {
+        const VoxelStep step{steps.slot[n], steps.length[n], steps.weight[n], steps.depth[n]};
+        const int p = steps.packed[n];
+        const VoxelPlace place{steps.lattice, steps.brick[n], internal::packed_i(p), internal::packed_j(p),
+                               internal::packed_k(p)};
+        if (!visit(step, place)) return false;
+      }
+      return true;
     });
   }
 

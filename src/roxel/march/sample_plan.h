@@ -22,7 +22,7 @@ struct SamplePlanOptions {
 struct SamplePlan {
   int finest_level = 0;
   int root_level = 0;
-  Stretch range;  ///< near to far, world units along the optical axis
+  Stretch range{0, 0};  ///< near to far, world units along the optical axis
 
   /// Largest depth that samples of `level` serve; infinite for the finest level.
   double serves_until(int level) const {

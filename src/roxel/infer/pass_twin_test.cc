@@ -1,0 +1,132 @@
+#include "roxel/infer/pass_twin.h"
+
+#include <gtest/gtest.h>
+
+#include "roxel/infer/infer_fixture.h"
+
+namespace roxel {
+namespace {
+
+using fixture::nodes_around;
+using fixture::random_volume;
+
+// Chords, opacities, likelihoods and sums are floats: about 1e-6 each, a few hundred of them in a sum, and
+// covariances are differences of second moments (60^2) of like size: about 1e-3 of the noise variance 16.
+constexpr double kTolerance = 1e-3;
+
+/// The largest difference of tau and colour between the engine's volume and the twin, relative to 1 + the
+/// value.
+struct Difference {
+  double tau = 0, mean = 0, cov = 0, weight = 0, confidence = 0;
+};
+
+Difference difference(const Volume& volume, const PassTwin& twin) {
+  Difference most;
+  const auto raise = [](double& worst, double got, double expected) {
+    const double off = std::abs(got - expected) / (1 + std::abs(expected));
+    if (!(off <= worst)) worst = off;  // NaN is worst of all
+  };
+  for (int cell = 0; cell < static_cast<int>(twin.voxels().size()); ++cell) {
+    const TwinVoxel& expected = twin.voxels()[cell];
+    if (!expected.exists) continue;
+    const std::uint32_t slot = volume.index(0).slot(twin.ijk(cell));
+    raise(most.tau, volume.tau[slot], expected.tau);
+    raise(most.confidence, volume.confidence[slot], expected.looked / (expected.looked + 2));
+    raise(most.weight, volume.color_weight[slot], expected.color.weight);
+    if (expected.color.weight < 1e-2) continue;  // fixed point leaves little of smaller sums
+    const Eigen::Vector3d mean = expected.color.mean();
+    const Eigen::Matrix3d cov = expected.color.cov();
+    for (int c = 0; c < 3; ++c) raise(most.mean, volume.color_mean[slot][c], mean[c]);
+    const double expected_cov[6] = {cov(0, 0), cov(1, 1), cov(2, 2), cov(0, 1), cov(0, 2), cov(1, 2)};
+    for (int c = 0; c < 6; ++c) raise(most.cov, volume.color_cov[slot][c], expected_cov[c]);
+  }
+  return most;
+}
+
+/// Runs `passes` passes of the engine, each from its own last result, and the twin beside it.
+void expect_same(const PassOptions& chosen, int divisions, double largest_tau, unsigned seed) {
+  std::mt19937 random(seed);
+  Volume volume = random_volume({2, 1, 2}, 0.7, 0.005, largest_tau, random);
+  const std::vector<SampleNode> nodes = nodes_around(volume, 4, 16, divisions, random);
+  PassOptions options = chosen;
+  for (int pass = 0; pass < 3; ++pass) {
+    options.everywhere = pass == 0;
+    PassTwin twin(volume, options);
+    twin.run(nodes);
+    const PassReport report = run_pass(nodes, options, RunContext(1), nullptr, volume);
+    const Difference most = difference(volume, twin);
+    EXPECT_LE(most.tau, kTolerance) << "pass " << pass;
+    EXPECT_LE(most.confidence, kTolerance) << "pass " << pass;
+    EXPECT_LE(most.weight, kTolerance) << "pass " << pass;
+    EXPECT_LE(most.mean, kTolerance) << "pass " << pass;
+    EXPECT_LE(most.cov, 10 * kTolerance) << "pass " << pass;
+    if (options.opacity.rule == UpdateRule::kPosterior) {
+      EXPECT_NEAR(report.opacity.log_likelihood, twin.log_likelihood(),
+                  1e-4 * report.opacity.observation_weight);
+    }
+  }
+}
+
+TEST(RunPass, PosteriorIsItsSlowTwin) { expect_same({}, 0, 0.15, 1); }
+
+TEST(RunPass, PosteriorWithoutPredictionIsItsSlowTwin) {
+  PassOptions options;
+  options.predictive = false;
+  options.opacity.model.evidence_half = 0;
+  expect_same(options, 0, 0.15, 2);
+}
+
+TEST(RunPass, AdaptivePosteriorIsItsSlowTwin) {
+  expect_same({}, 1, 0.15, 3);
+  expect_same({}, 2, 0.15, 4);
+}
+
+TEST(RunPass, RayWeightsAreTheirSlowTwins) {
+  PassOptions options;
+  options.opacity.ray_weights = true;
+  expect_same(options, 1, 0.15, 5);
+}
+
+TEST(RunPass, RoxelsRuleIsItsSlowTwin) {
+  PassOptions options;
+  options.opacity.rule = UpdateRule::kRoxels;
+  expect_same(options, 0, 0.15, 6);
+  expect_same(options, 2, 0.15, 7);
+}
+
+TEST(RunPass, EveryAgreementIsItsSlowTwin) {
+  for (const Agreement agreement : {Agreement::kExponential, Agreement::kLinear}) {
+    PassOptions options;
+    options.opacity.model.agreement = agreement;
+    options.opacity.model.scale = agreement == Agreement::kLinear ? 40 : 12;
+    expect_same(options, 0, 0.15, 8);
+  }
+}
+
+TEST(RunPass, EveryBackgroundIsItsSlowTwin) {
+  for (const BackgroundKind kind : {BackgroundKind::kNone, BackgroundKind::kKnown, BackgroundKind::kMask}) {
+    PassOptions options;
+    options.opacity.background.kind = kind;
+    options.opacity.background.mean[0] = 30;
+    options.opacity.background.mean[1] = -18;
+    options.opacity.background.mean[2] = 27;
+    expect_same(options, 1, 0.15, 9);
+  }
+}
+
+// Opaque volumes: rays stop early, so that what they leave out is below SegmentMarch::kNegligible of a ray.
+TEST(RunPass, OpaqueVolumesDifferByTheEarlyStopAtMost) {
+  std::mt19937 random(10);
+  Volume volume = random_volume({2, 1, 2}, 0.7, 0.05, 5, random);
+  const std::vector<SampleNode> nodes = nodes_around(volume, 4, 16, 1, random);
+  const PassOptions options;
+  PassTwin twin(volume, options);
+  twin.run(nodes);
+  run_pass(nodes, options, RunContext(1), nullptr, volume);
+  // A ray leaves out at most 1e-4 of itself; up to about 100 cross a voxel, over a weight of at least beta
+  // = 5.
+  EXPECT_LE(difference(volume, twin).tau, 100 * 1e-4 / 5);
+}
+
+}  // namespace
+}  // namespace roxel
