@@ -57,14 +57,28 @@ TEST(Frustum, DoesNotSeeBoxesBesideBehindOrPastTheRange) {
   EXPECT_FALSE(sees_box(camera, AlignedBox3d()));
 }
 
-TEST(Frustum, EdgeAgainstEdgeIsSeparatedByACrossProductAxis) {
-  // A camera rolled by 45 degrees about its axis has an edge of its pyramid along (sqrt 2, 0, 1). The box
-  // pokes past both of that edge's faces only beside the edge, where a face test alone says nothing.
+/// How many points of a lattice in the box are seen.
+int count_seen(const PinholeCamera& camera, const AlignedBox3d& box, const DepthRange& range, int steps) {
+  int seen = 0;
+  for (int i = 0; i <= steps; ++i)
+    for (int j = 0; j <= steps; ++j)
+      for (int k = 0; k <= steps; ++k)
+        seen += sees(camera, box.min() + box.sizes().cwiseProduct(Vector3d(i, j, k)) / steps, range);
+  return seen;
+}
+
+TEST(Frustum, EdgeBesideEdgeIsSeparatedByNoFace) {
+  // Turned down by 2 radians, the pyramid passes an edge of the box at a distance of 0.54, though no face of
+  // either has the other wholly on its outer side.
   PinholeCamera camera = square_camera();
-  camera.pose.rotation = Eigen::AngleAxisd(std::acos(-1.0) / 4, Vector3d::UnitZ()).toRotationMatrix();
-  const double edge = std::sqrt(2.0) * 10;
-  EXPECT_TRUE(sees_box(camera, AlignedBox3d(Vector3d(edge - 0.1, -3, 9), Vector3d(edge + 9, 3, 10))));
-  EXPECT_FALSE(sees_box(camera, AlignedBox3d(Vector3d(edge + 0.1, -3, 9), Vector3d(edge + 9, 3, 10))));
+  camera.pose.rotation = Eigen::AngleAxisd(2, Vector3d::UnitX()).toRotationMatrix();
+  const DepthRange range{0.5, 6};
+  AlignedBox3d box(Vector3d(2.75, -1.75, -5.25), Vector3d(4.25, 0.75, -0.75));
+  EXPECT_FALSE(sees_box(camera, box, range));
+  EXPECT_EQ(count_seen(camera, box, range, 40), 0);
+  box.translate(Vector3d(-0.8, 0.9, 0));
+  EXPECT_TRUE(sees_box(camera, box, range));
+  EXPECT_GT(count_seen(camera, box, range, 40), 0);
 }
 
 double unit(unsigned x) { return (x % 100000) / 99999.0; }
@@ -81,12 +95,7 @@ RC_GTEST_PROP(Frustum, AgreesWithSamplingTheBox,
   const Vector3d half(0.05 + unit(d) / 2, 0.05 + unit(e) / 2, 0.05 + unit(b) / 2);
   const AlignedBox3d box(middle - half, middle + half);
   const DepthRange range{0.2, 3};
-  int seen = 0;
-  constexpr int kSteps = 12;
-  for (int i = 0; i <= kSteps; ++i)
-    for (int j = 0; j <= kSteps; ++j)
-      for (int k = 0; k <= kSteps; ++k)
-        seen += sees(camera, box.min() + box.sizes().cwiseProduct(Vector3d(i, j, k)) / kSteps, range);
+  const int seen = count_seen(camera, box, range, 12);
   RC_CLASSIFY(seen > 0);
   RC_CLASSIFY(sees_box(camera, box, range));
   // Sampling may miss a sliver, so only one direction holds for every box.

@@ -250,6 +250,8 @@ TEST_F(BadImage, NoImageAtAll) {
     put_bytes(path(name), "This is a text file that somebody renamed.\n");
     expect_refused(path(name), "no image that can be read");
     EXPECT_THROW(image_size(path(name)), InvalidInput) << name;
+    EXPECT_THAT([&] { read_image(path(name)); },
+                ThrowsMessage<InvalidInput>(::testing::Not(HasSubstr("no reason given"))));
   }
 }
 

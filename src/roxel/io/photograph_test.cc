@@ -24,7 +24,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr int kWidth = 80, kHeight = 60;
+constexpr int kWidth = 80, kHeight = 60, kMaskEdge = 60;
 
 /// Red tells the column, green the row, of a file of 80 x 60 pixels.
 Image position_image() {
@@ -59,11 +59,11 @@ class LoadPhotograph : public ::testing::Test {
     view_.lens.model = LensModel::kSimpleRadial;
     view_.lens.coefficients[0] = k1;
   }
-  /// Left half background, right half object.
+  /// Background to the left of column 60, object from there on.
   void add_mask() {
     Mask mask(kWidth, kHeight, 0);
     for (int y = 0; y < kHeight; ++y)
-      for (int x = kWidth / 2; x < kWidth; ++x) mask.at(x, y) = 255;
+      for (int x = kMaskEdge; x < kWidth; ++x) mask.at(x, y) = 255;
     view_.mask_path = path("mask.png");
     write_png(view_.mask_path, mask);
   }
@@ -103,8 +103,8 @@ TEST_F(LoadPhotograph, UndoesTheLensOfImageAndMaskAlike) {
       // The file has 8 bits: half a code is 0.2 of the 0.01 that one pixel is.
       ASSERT_NEAR(photograph.rgb.pixel(x, y)[0] * 100, p.x(), 0.21);
       ASSERT_NEAR(photograph.rgb.pixel(x, y)[1] * 100, p.y(), 0.21);
-      if (std::abs(p.x() - kWidth / 2) > 0.5)
-        ASSERT_EQ(photograph.foreground.at(x, y), p.x() > kWidth / 2 ? 255 : 0);
+      if (std::abs(p.x() - kMaskEdge) > 0.5)
+        ASSERT_EQ(photograph.foreground.at(x, y), p.x() > kMaskEdge ? 255 : 0);
     }
 }
 
