@@ -1,0 +1,134 @@
+/// roxel merge: joins the volumes of several runs.
+
+#include <nlohmann/json.hpp>
+
+#include "command.h"
+#include "common.h"
+#include "roxel/base/atomic_file.h"
+#include "roxel/base/error.h"
+#include "roxel/io/voxels_ply.h"
+#include "roxel/report/run_record.h"
+#include "roxel/volume/merge.h"
+
+namespace roxel::cli {
+namespace {
+
+struct MergeCommandOptions {
+  std::optional<double> opacity_threshold;
+  CommonOptions common;
+};
+
+OptionTable<MergeCommandOptions> merge_table() {
+  OptionTable<MergeCommandOptions> table;
+  table.group("Result");
+  table.add("opacity-threshold", &MergeCommandOptions::opacity_threshold)
+      .help("Voxels below this opacity are left out of voxels.ply")
+      .range(0, 0.999)
+      .unset("that of the first run");
+  table.include(common_option_table(), &MergeCommandOptions::common);
+  return table;
+}
+
+/// Throws unless `what` of a run is that of the first.
+void expect_same(const FinishedRun& run, const FinishedRun& first, const std::string& what,
+                 const std::string& found, const std::string& expected) {
+  if (found != expected)
+    throw_invalid(run.path.string(), what + " " + found, expected + " as " + first.path.string() + " has");
+}
+
+std::string option_text(const FinishedRun& run, const char* name) { return run.option(name).dump(); }
+
+std::string exact(double value) { return nlohmann::json(value).dump(); }
+
+void check_compatible(const std::vector<FinishedRun>& runs) {
+  const FinishedRun& first = runs.front();
+  for (const FinishedRun& run : runs) {
+    const VolumeInfo& info = run.file.info;
+    const VolumeInfo& expected = first.file.info;
+    expect_same(run, first, "colour space", to_string(info.colors.space()),
+                to_string(expected.colors.space()));
+    expect_same(run, first, "white point", to_string(info.colors.white()),
+                to_string(expected.colors.white()));
+    expect_same(run, first, "exposure", exact(info.exposure), exact(expected.exposure));
+    for (const char* name : {"update", "prior-strength"})
+      expect_same(run, first, std::string("option ") + name, option_text(run, name),
+                  option_text(first, name));
+  }
+}
+
+MergeOptions merge_options(const FinishedRun& run) {
+  MergeOptions options;
+  options.rule = run.option("update") == "roxels" ? SupportRule::kRoxels : SupportRule::kPosterior;
+  if (run.option("prior-strength").is_number())
+    options.prior_strength = run.option("prior-strength").get<double>();
+  return options;
+}
+
+/// The first run's summary, less what was true of that run alone.
+nlohmann::ordered_json merged_summary(const Invocation& invocation, const std::vector<FinishedRun>& runs,
+                                      const Volume& volume) {
+  nlohmann::ordered_json summary = runs.front().summary;
+  nlohmann::ordered_json sources = nlohmann::ordered_json::array();
+  for (const FinishedRun& run : runs)
+    sources.push_back(
+        {{"run", run.path.string()}, {"dataset", run.summary.value("dataset", nlohmann::json())}});
+  for (const char* key : {"levels", "passes", "stages", "notes", "warnings", "views"})
+    summary[key] = nlohmann::ordered_json::array();
+  summary["command"] = invocation.line;
+  summary["termination"] = "merged";
+  summary["reprojection_rms_percent"] = nullptr;
+  summary["merged_from"] = sources;
+  summary["voxels_in_box"] = volume.box_slot_count();
+  const LatticeFrame& frame = volume.index(0).frame();
+  const Eigen::Vector3d low = frame.box().min(), high = frame.box().max();
+  const Eigen::Vector3i voxels = frame.size_in_voxels();
+  summary["scene"]["bounds"] = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+  summary["scene"]["bounds_from"] = "merged runs";
+  summary["scene"]["lattice_origin"] = {low.x(), low.y(), low.z()};
+  summary["scene"]["lattice_voxels"] = {voxels.x(), voxels.y(), voxels.z()};
+  summary["scene"]["surround_lattices"] = volume.lattice_count() - 1;
+  return summary;
+}
+
+float ply_threshold(const MergeCommandOptions& options, const FinishedRun& run) {
+  const nlohmann::json& used = run.option("opacity-threshold");
+  return static_cast<float>(options.opacity_threshold.value_or(used.is_number() ? used.get<double>() : 0));
+}
+
+int run_merge(const Invocation& invocation, const MergeCommandOptions& options) {
+  if (invocation.inputs.size() < 2) throw InvalidInput("merge: found 1 run, expected at least 2");
+  std::vector<FinishedRun> runs;
+  for (const std::string& path : invocation.inputs) runs.push_back(read_run(path));
+  check_compatible(runs);
+  const OutputFolder folder(invocation.output);
+  Session session(options.common);
+  std::vector<const Volume*> volumes;
+  for (const FinishedRun& run : runs) volumes.push_back(&run.file.volume);
+  const Volume merged = merge(volumes, merge_options(runs.front()), session.context().thread_count());
+  session.context().throw_if_cancelled();
+  remove_results(invocation.output);
+  const VolumeInfo& info = runs.front().file.info;
+  write_volume(invocation.output / "volume.vdb", merged, info, SavedLattices::kAll);
+  write_voxels_ply(invocation.output / "voxels.ply", merged, info.colors,
+                   ply_threshold(options, runs.front()));
+  session.context().throw_if_cancelled();
+  const std::string json = json_text(merged_summary(invocation, runs, merged));
+  write_text_atomically(invocation.output / "summary.json", json + "\n");
+  print_result(options.common,
+               std::to_string(runs.size()) + " runs, " + std::to_string(merged.box_slot_count()) +
+                   " voxels, written to " + invocation.output.string() + "\n",
+               json);
+  return 0;
+}
+
+}  // namespace
+
+void add_merge(Commands& commands) {
+  CommandForm form{"merge", "Join the volumes of several runs", "RUN...", "RUN"};
+  form.details =
+      "Runs of neighbouring boxes, or of the same box from other photographs, with voxels of one size on\n"
+      "one lattice: what one run over all photographs would have summed.\n";
+  add_command(commands, form, merge_table(), run_merge);
+}
+
+}  // namespace roxel::cli

@@ -1,0 +1,267 @@
+/// roxel reconstruct: photographs to a volume, then depth, renders and errors of every view.
+
+#include <chrono>
+#include <cinttypes>
+
+#include "command.h"
+#include "describe.h"
+#include "roxel/base/atomic_file.h"
+#include "roxel/base/content_hash.h"
+#include "roxel/base/error.h"
+#include "roxel/base/parallel.h"
+#include "roxel/io/voxels_ply.h"
+#include "view_writer.h"
+
+namespace roxel::cli {
+namespace {
+
+constexpr double kVolumeShare = 0.85;  ///< of the bar; what is left is for depth and pictures
+constexpr double kVolumeWritten = 0.88;
+
+struct StageSwitches {
+  std::optional<std::string> init;
+  bool dry_run = false;
+  bool depth = true;
+  bool render = true;
+  bool save_surround = false;
+};
+
+struct RunOptions {
+  ReconstructOptions reconstruct;
+  InputOptions input;
+  StageSwitches stages;
+  CommonOptions common;
+};
+
+OptionTable<StageSwitches> stage_table() {
+  OptionTable<StageSwitches> table;
+  table.group("Run");
+  table.add("init", &StageSwitches::init)
+      .help("Start from the volume of this run instead of from nothing")
+      .placeholder("RUN")
+      .unset("none");
+  table.add("dry-run", &StageSwitches::dry_run)
+      .help("Say what would be done, and what memory and time it would take");
+  table.add("depth", &StageSwitches::depth).help("Leave out depth maps");
+  table.add("render", &StageSwitches::render).help("Leave out renders and errors of the input views");
+  table.add("save-surround", &StageSwitches::save_surround)
+      .help("Keep the voxels around the box in volume.vdb");
+  return table;
+}
+
+OptionTable<RunOptions> run_table() {
+  OptionTable<RunOptions> table;
+  table.include(input_option_table(), &RunOptions::input);
+  table.include(stage_table(), &RunOptions::stages);
+  table.include(reconstruct_option_table(), &RunOptions::reconstruct);
+  table.include(common_option_table(), &RunOptions::common);
+  return table;
+}
+
+/// Times the stages of a run one after the other.
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = Clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    return seconds;
+  }
+  double total() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now(), last_ = start_;
+};
+
+/// The volume to start from; its colours must be in the space that this run compares colours in.
+VolumeFile read_initial(const std::string& run, const ReconstructOptions& options) {
+  VolumeFile initial = read_volume(std::filesystem::path(run) / "volume.vdb");
+  const ColorTransform wanted(options.color_space, parse_white_point(options.white_point, "--white-point"));
+  const ColorTransform& found = initial.info.colors;
+  if (found.space() != wanted.space() || !(found.white() == wanted.white()))
+    throw_invalid("--init " + run,
+                  "colours in " + to_string(found.space()) + " with white " + to_string(found.white()),
+                  to_string(wanted.space()) + " with white " + to_string(wanted.white()) +
+                      ", as --color-space and " + "--white-point say");
+  return initial;
+}
+
+/// Hashes of the image files, one a view.
+std::vector<std::string> hash_images(const Dataset& dataset, const RunContext& context) {
+  std::vector<std::string> hashes(dataset.views.size());
+  parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
+    context.throw_if_cancelled();
+    hashes[v] = hash_file(dataset.views[v].image_path);
+  });
+  return hashes;
+}
+
+std::string pass_text(const PassRecord& record, const ReconstructOptions& options) {
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "level %d/%d pass %d/%d: %" PRId64
+                " voxels, log-likelihood %.4f, opacity change %.5f, %.1f s",
+                record.level, options.levels, record.pass, options.passes, record.active_voxels,
+                record.mean_log_likelihood, record.mean_opacity_change, record.seconds);
+  return text;
+}
+
+/// Pictures are in the photographs' own response; high dynamic range goes through sRGB.
+Response picture_response(const Input& input, const Scene& scene) {
+  return scene.exposure == 1 && input.response ? *input.response : Response{};
+}
+
+/// One run, step by step.
+class Run {
+ public:
+  Run(const Invocation& invocation, const RunOptions& options)
+      : invocation_(invocation),
+        options_(options),
+        input_(read_input(invocation.inputs.front(), options.input)) {}
+
+  int execute() {
+    if (options_.stages.dry_run) return describe_only();
+    if (invocation_.output.empty()) throw InvalidInput("-o RUN is missing; see roxel reconstruct --help");
+    std::optional<VolumeFile> initial;
+    if (options_.stages.init) initial = read_initial(*options_.stages.init, options_.reconstruct);
+    const OutputFolder folder(invocation_.output);
+    for (const std::string& warning : input_.dataset.warnings) warn(options_.common, warning);
+    Session session(options_.common);
+    hashes_ = hash_images(input_.dataset, session.context());
+    stopwatch_.lap();
+    make_volume(session, initial ? &initial->volume : nullptr);
+    remove_results(invocation_.output);
+    write_volume_files(session);
+    write_views(session);
+    session.context().throw_if_cancelled();
+    finish(session);
+    return 0;
+  }
+
+ private:
+  int describe_only() const {
+    Session session(options_.common);
+    const Description description = describe(input_, options_.reconstruct, session.context());
+    session.display().clear();
+    print_result(options_.common, description.text, json_text(description.json));
+    return 0;
+  }
+
+  void make_volume(Session& session, const Volume* initial) {
+    ReconstructHooks hooks;
+    hooks.initial = initial;
+    hooks.after_pass = [&](const PassRecord& record) {
+      session.display().line(pass_text(record, options_.reconstruct));
+    };
+    made_ = reconstruct(input_.dataset, input_.load, options_.reconstruct, session.context(), hooks,
+                        kVolumeShare);
+    stopwatch_.lap();
+  }
+
+  void write_volume_files(Session& session) {
+    report(session, "writing", kVolumeShare);
+    VolumeInfo info;
+    info.colors = made_.scene.transform;
+    info.exposure = made_.scene.exposure;
+    info.dataset = input_.dataset.path;
+    write_volume(invocation_.output / "volume.vdb", made_.volume, info,
+                 options_.stages.save_surround ? SavedLattices::kAll : SavedLattices::kBoxOnly);
+    session.context().throw_if_cancelled();
+    write_voxels_ply(invocation_.output / "voxels.ply", made_.volume, made_.scene.transform,
+                     static_cast<float>(options_.reconstruct.opacity_threshold));
+    session.context().throw_if_cancelled();
+    made_.summary.stages.push_back({"write volume", stopwatch_.lap()});
+    report(session, "writing", kVolumeWritten);
+  }
+
+  void write_views(Session& session) {
+    ViewWriter writer(invocation_.output, input_.dataset, made_.scene.exposure,
+                      picture_response(input_, made_.scene));
+    ViewStageOptions stages;
+    stages.depth = options_.stages.depth;
+    stages.render = options_.stages.render;
+    stages.progress_begin = kVolumeWritten;
+    for_each_view_result(input_.dataset, input_.load, made_, options_.reconstruct, stages, session.context(),
+                         [&](const ViewResult& result) { writer.write(result); });
+    writer.write_overview();
+    views_ = writer.figures();
+    reprojection_rms_ = writer.reprojection_rms();
+    if (stages.depth || stages.render)
+      made_.summary.stages.push_back({"depth and pictures", stopwatch_.lap()});
+  }
+
+  void finish(Session& session) {
+    made_.summary.seconds = stopwatch_.total();
+    made_.summary.peak_memory_bytes = peak_memory_bytes();
+    const std::string json = json_text(to_json(make_record(session.context().thread_count())));
+    write_text_atomically(invocation_.output / "summary.json", json + "\n");
+    session.display().clear();
+    print_result(options_.common, brief(), json);
+  }
+
+  RunRecord make_record(int threads) const {
+    RunRecord record;
+    record.command_line = invocation_.line;
+    record.dataset_path = input_.dataset.path;
+    record.dataset_format = input_.dataset.format;
+    record.nodes = static_cast<int>(input_.dataset.nodes.size());
+    record.options = run_table().to_json(options_);
+    record.threads = threads;
+    record.scene = made_.scene;
+    record.frame = made_.volume.index(0).frame();
+    record.summary = made_.summary;
+    record.warnings = input_.dataset.warnings;
+    record.views = views_;
+    record.reprojection_rms = reprojection_rms_;
+    for (std::size_t v = 0; v < hashes_.size(); ++v) {
+      record.views[v].hash = hashes_[v];
+      add_to_hash(input_.dataset.views[v], hashes_[v], record.dataset_hash);
+    }
+    return record;
+  }
+
+  std::string brief() const {
+    std::string text = made_.summary.brief() + "\n";
+    if (reprojection_rms_) {
+      char line[64];
+      std::snprintf(line, sizeof line, "reprojection error %.2f %% of full scale\n", *reprojection_rms_);
+      text += line;
+    }
+    return text + "written to " + invocation_.output.string() + "\n";
+  }
+
+  static void report(Session& session, const char* stage, double fraction) {
+    Progress progress;
+    progress.stage = stage;
+    progress.fraction = fraction;
+    session.context().report(progress);
+  }
+
+  const Invocation& invocation_;
+  const RunOptions& options_;
+  Input input_;
+  std::vector<std::string> hashes_;
+  Stopwatch stopwatch_;
+  Reconstruction made_;
+  std::vector<ViewFigures> views_;
+  std::optional<double> reprojection_rms_;
+};
+
+int run_reconstruct(const Invocation& invocation, const RunOptions& options) {
+  return Run(invocation, options).execute();
+}
+
+}  // namespace
+
+void add_reconstruct(Commands& commands) {
+  CommandForm form{"reconstruct", "Make a volume from calibrated photographs, then depth maps and renders",
+                   "DATASET", "RUN"};
+  form.output_required = false;  // a dry run writes nothing
+  form.details =
+      "What is in RUN afterwards: summary.json, volume.vdb, voxels.ply, overview.png, and for every image\n"
+      "depth/NAME.exr (and .png), render/NAME.png, error/NAME.png.\n";
+  add_command(commands, form, run_table(), run_reconstruct);
+}
+
+}  // namespace roxel::cli

@@ -1,0 +1,88 @@
+#pragma once
+/// What several commands share: common options, how a data set is read, and the frame around a long job.
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "progress_display.h"
+#include "roxel/base/option_table.h"
+#include "roxel/base/run_context.h"
+#include "roxel/io/dataset_reader.h"
+#include "roxel/io/photograph.h"
+
+namespace roxel::cli {
+
+struct CommonOptions {
+  std::optional<int> threads;
+  bool quiet = false;
+  bool verbose = false;
+  bool json = false;
+};
+
+const OptionTable<CommonOptions>& common_option_table();
+
+/// How photographs and cameras are read.
+struct InputOptions {
+  std::string format = "auto";
+  std::optional<std::string> images;
+  std::optional<std::string> nodes;
+  std::string masks = "auto";
+  std::string response = "auto";
+};
+
+const OptionTable<InputOptions>& input_option_table();
+
+/// A data set that was read, and how to get at its pixels.
+struct Input {
+  Dataset dataset;
+  PhotographLoader load;
+  std::optional<Response> response;  ///< where it was chosen
+};
+
+Input read_input(const std::string& path, const InputOptions& options);
+
+/// Progress, Ctrl-C and messages around a long job. One at a time.
+class Session {
+ public:
+  explicit Session(const CommonOptions& options);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  RunContext& context() { return context_; }
+  ProgressDisplay& display() { return display_; }
+
+ private:
+  ProgressDisplay display_;
+  RunContext context_;
+};
+
+/// A warning for people on stderr, unless --quiet.
+void warn(const CommonOptions& options, const std::string& message);
+
+/// Indented; text that is not UTF-8 gets replacement characters.
+std::string json_text(const nlohmann::ordered_json& json);
+
+/// Text on stdout at the end of a command: `json` with --json, else `text` unless --quiet.
+void print_result(const CommonOptions& options, const std::string& text, const std::string& json);
+
+/// A folder that results go to. It is made, and tried by writing, before any long work; folders that were
+/// made and are still empty in the end are removed.
+class OutputFolder {
+ public:
+  /// Throws IoError.
+  explicit OutputFolder(std::filesystem::path path);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  std::vector<std::filesystem::path> made_;  ///< outermost first
+};
+
+}  // namespace roxel::cli

@@ -1,0 +1,173 @@
+#include "describe.h"
+
+#include <cstdarg>
+#include <cstdio>
+#include <map>
+
+#include "progress_display.h"
+#include "roxel/dataset/box_visibility.h"
+#include "roxel/solve/estimate.h"
+
+namespace roxel::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kSurveyedViews = 16;
+constexpr double kGibibyte = 1024.0 * 1024.0 * 1024.0;
+
+__attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ...) {
+  char text[512];
+  va_list values;
+  va_start(values, pattern);
+  std::vsnprintf(text, sizeof text, pattern, values);
+  va_end(values);
+  return text;
+}
+
+/// The scene as the reconstruction will see it; background, exposure and surround from a few images only, so
+/// that large data sets are described quickly.
+Scene preview_scene(const Input& input, const ReconstructOptions& options, RunContext& context) {
+  Scene scene = lay_out(input.dataset, input.load, options);
+  Dataset few = input.dataset;
+  const int count = static_cast<int>(few.views.size());
+  const int kept = std::min(count, kSurveyedViews);
+  std::vector<View> views;
+  for (int i = 0; i < kept; ++i) views.push_back(few.views[static_cast<std::size_t>(i) * count / kept]);
+  few.views = std::move(views);
+  few.nodes.clear();
+  assign_nodes(few);
+  ReconstructOptions with_box = options;
+  const Eigen::Vector3d low = scene.bounds.box.min(), high = scene.bounds.box.max();
+  with_box.bounds = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+  const Scene surveyed = survey(few, input.load, with_box, context);
+  scene.background = surveyed.background;
+  scene.exposure = surveyed.exposure;
+  scene.surround_count = surveyed.surround_count;
+  for (const std::string& note : surveyed.notes)
+    if (!note.starts_with("bounds:")) scene.notes.push_back(note);
+  return scene;
+}
+
+std::string image_sizes(const Dataset& dataset) {
+  std::map<std::pair<int, int>, int> sizes;
+  for (const View& view : dataset.views)
+    ++sizes[{view.camera.intrinsics.width, view.camera.intrinsics.height}];
+  std::string text;
+  for (const auto& [size, count] : sizes) {
+    if (text.size() > 200) return text + ", ...";
+    text += (text.empty() ? "" : ", ") + format("%d x %d", size.first, size.second);
+    if (sizes.size() > 1) text += format(" (%d)", count);
+  }
+  return text;
+}
+
+int count_masks(const Dataset& dataset) {
+  int masks = 0;
+  for (const View& view : dataset.views) masks += !view.mask_path.empty() || view.has_alpha;
+  return masks;
+}
+
+int count_lenses(const Dataset& dataset) {
+  std::vector<Lens> lenses;
+  for (const View& view : dataset.views)
+    if (std::find(lenses.begin(), lenses.end(), view.lens) == lenses.end()) lenses.push_back(view.lens);
+  return static_cast<int>(lenses.size());
+}
+
+std::string box_text(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d a = box.min(), b = box.max();
+  return format("%.6g,%.6g,%.6g,%.6g,%.6g,%.6g", a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
+}
+
+std::string memory_text(double bytes) {
+  return bytes < 0.1 * kGibibyte ? format("%.0f MiB", bytes / 1024 / 1024)
+                                 : format("%.1f GiB", bytes / kGibibyte);
+}
+
+/// "  label      value" with the values in one column.
+std::string row(const std::string& label, const std::string& value) {
+  std::string text = "  " + label;
+  text.resize(14, ' ');
+  return text + value + "\n";
+}
+
+}  // namespace
+
+Description describe(const Input& input, const ReconstructOptions& options, RunContext& context) {
+  const Dataset& dataset = input.dataset;
+  const Scene scene = preview_scene(input, options, context);
+  const Eigen::Vector3i voxels = nested_frames(scene.bounds.box, scene.voxel_size, 0)[0].size_in_voxels();
+  const BoxVisibility seen = box_visibility(dataset, scene.bounds, scene.voxel_size);
+  const CostEstimate cost = estimate_cost(dataset, scene, options, context.thread_count());
+  std::vector<std::string> warnings = dataset.warnings;
+  for (const std::string& warning : scale_warnings(dataset, scene.bounds, scene.voxel_size))
+    warnings.push_back(warning);
+  std::vector<std::string> notes = dataset.notes;
+  notes.insert(notes.end(), scene.notes.begin(), scene.notes.end());
+  const int masks = count_masks(dataset), lenses = count_lenses(dataset);
+
+  Description out;
+  out.text = dataset.path + "\n";
+  out.text += row("format", dataset.format);
+  out.text += row("images", format("%zu, %s pixels", dataset.views.size(), image_sizes(dataset).c_str()));
+  out.text += row("masks", masks == 0 ? "none" : format("%d", masks));
+  out.text += row("cameras", format("%d", lenses));
+  out.text += row("nodes", format("%zu", dataset.nodes.size()));
+  if (!dataset.points.empty()) out.text += row("points", format("%zu", dataset.points.size()));
+  out.text += row("bounds", box_text(scene.bounds.box));
+  out.text += row("", scene.bounds.how);
+  out.text += row("far", format("%.6g", scene.bounds.far));
+  out.text += row("voxels", format("%d x %d x %d of %.6g, %d levels", voxels.x(), voxels.y(), voxels.z(),
+                                   scene.voxel_size, options.levels));
+  out.text +=
+      row("surround", scene.surround_count > 0 ? format("%d lattices", scene.surround_count) : "none");
+  out.text += row("voxel in px", format("%.2f (median of %d images that see the box; %.2f to %.2f)",
+                                        seen.median_pixels_per_voxel, seen.views, seen.min_pixels_per_voxel,
+                                        seen.max_pixels_per_voxel));
+  out.text += row("seen twice", format("%.0f %% of the box", 100 * seen.share_seen_twice));
+  out.text += row("memory", "about " + memory_text(cost.memory_bytes));
+  out.text +=
+      row("time", "about " + duration_text(cost.seconds) + format(" on %d threads", context.thread_count()));
+  for (const std::string& note : notes)
+    if (!note.starts_with("bounds:")) out.text += row("note", note);
+  for (const std::string& warning : warnings) out.text += row("WARNING", warning);
+
+  const Eigen::Vector3d low = scene.bounds.box.min(), high = scene.bounds.box.max();
+  ordered_json levels = ordered_json::array();
+  for (const LevelEstimate& level : cost.levels)
+    levels.push_back({{"voxel_size", level.voxel_size},
+                      {"voxels", level.voxels},
+                      {"steps_per_pass", level.steps_per_pass}});
+  out.json = {{"dataset", dataset.path},
+              {"format", dataset.format},
+              {"images", dataset.views.size()},
+              {"image_sizes", image_sizes(dataset)},
+              {"masks", masks},
+              {"cameras", lenses},
+              {"nodes", dataset.nodes.size()},
+              {"points", dataset.points.size()},
+              {"bounds", {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()}},
+              {"bounds_from", scene.bounds.how},
+              {"far", scene.bounds.far},
+              {"voxel_size", scene.voxel_size},
+              {"voxels", {voxels.x(), voxels.y(), voxels.z()}},
+              {"levels", options.levels},
+              {"surround_lattices", scene.surround_count},
+              {"pixels_per_voxel",
+               {{"min", seen.min_pixels_per_voxel},
+                {"median", seen.median_pixels_per_voxel},
+                {"max", seen.max_pixels_per_voxel}}},
+              {"views_of_box", seen.views},
+              {"share_seen_twice", seen.share_seen_twice},
+              {"estimate",
+               {{"memory_bytes", cost.memory_bytes},
+                {"seconds", cost.seconds},
+                {"threads", context.thread_count()},
+                {"levels", levels}}},
+              {"notes", notes},
+              {"warnings", warnings}};
+  return out;
+}
+
+}  // namespace roxel::cli

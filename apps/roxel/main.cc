@@ -1,0 +1,94 @@
+/// roxel COMMAND ...: finds the command, runs it, and turns errors into one line and an exit code.
+
+#include <cstdio>
+#include <cstring>
+#include <new>
+
+#include "command.h"
+#include "roxel/base/error.h"
+
+namespace roxel::cli {
+namespace {
+
+enum ExitCode { kDone = 0, kFailed = 1, kBadInput = 2, kInterrupted = 130 };
+
+Commands make_commands() {
+  Commands commands;
+  add_info(commands);
+  add_reconstruct(commands);
+  add_render(commands);
+  add_eval(commands);
+  add_merge(commands);
+  add_synth(commands);
+  add_convert(commands);
+  return commands;
+}
+
+std::string overview(const Commands& commands) {
+  std::string text = "Usage: roxel COMMAND ...\n\nCalibrated photographs to a probabilistic volume.\n\n";
+  for (const auto& command : commands) {
+    std::string name = "  " + command->form().name;
+    name.resize(16, ' ');
+    text += name + command->form().summary + "\n";
+  }
+  return text + "\nroxel COMMAND --help explains a command, roxel --version names the program.\n";
+}
+
+/// The tables of docs/options.md.
+void print_markdown(const Commands& commands) {
+  std::printf("# Options of every command\n\nMade from the program by `roxel help-markdown`; do not edit.\n");
+  for (const auto& command : commands) {
+    std::printf("\n## roxel %s\n\n%s.\n\n%s", command->form().name.c_str(), command->form().summary.c_str(),
+                command->options_markdown().c_str());
+  }
+}
+
+int run(const std::vector<std::string>& arguments) {
+  const Commands commands = make_commands();
+  if (arguments.empty()) {
+    std::fputs(overview(commands).c_str(), stderr);
+    return kBadInput;
+  }
+  const std::string& name = arguments.front();
+  if (name == "--help" || name == "-h" || name == "help")
+    return std::fputs(overview(commands).c_str(), stdout), kDone;
+  if (name == "--version") return std::printf("roxel %s\n", ROXEL_VERSION), kDone;
+  if (name == "help-markdown") return print_markdown(commands), kDone;
+  std::string known;
+  for (const auto& command : commands) {
+    if (command->form().name == name) return command->run({arguments.begin() + 1, arguments.end()});
+    known += (known.empty() ? "" : ", ") + command->form().name;
+  }
+  throw InvalidInput("unknown command \"" + name + "\", expected one of " + known);
+}
+
+/// The message on one line: exceptions of libraries may hold several.
+int fail(const char* message, ExitCode code) {
+  std::string line = message;
+  while (!line.empty() && line.back() == '\n') line.pop_back();
+  for (char& c : line)
+    if (c == '\n' || c == '\r') c = ' ';
+  std::fprintf(stderr, "roxel: error: %s\n", line.c_str());
+  return code;
+}
+
+int guarded(const std::vector<std::string>& arguments) {
+  try {
+    const int code = run(arguments);
+    if (std::fflush(stdout) != 0) return fail("standard output cannot be written", kFailed);
+    return code;
+  } catch (const InvalidInput& error) {
+    return fail(error.what(), kBadInput);
+  } catch (const Cancelled& error) {
+    return fail(error.what(), kInterrupted);
+  } catch (const std::bad_alloc&) {
+    return fail("out of memory; roxel info says how much a run needs, --resolution reduces it", kFailed);
+  } catch (const std::exception& error) {
+    return fail(error.what(), kFailed);
+  }
+}
+
+}  // namespace
+}  // namespace roxel::cli
+
+int main(int argc, char** argv) { return roxel::cli::guarded({argv + 1, argv + argc}); }

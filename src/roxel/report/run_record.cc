@@ -1,0 +1,207 @@
+#include "roxel/report/run_record.h"
+
+#include <cstdio>
+#include <fstream>
+
+#include "roxel/base/content_hash.h"
+#include "roxel/base/error.h"
+
+namespace roxel {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr int kFormat = 1;
+
+const char* background_name(BackgroundKind kind) {
+  switch (kind) {
+    case BackgroundKind::kNone:
+      return "none";
+    case BackgroundKind::kUnknown:
+      return "unknown";
+    case BackgroundKind::kKnown:
+      return "constant";
+    case BackgroundKind::kMask:
+      return "mask";
+  }
+  return "";
+}
+
+ordered_json numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+template <class T>
+ordered_json or_null(const std::optional<T>& value) {
+  return value ? ordered_json(*value) : ordered_json(nullptr);
+}
+
+ordered_json background_json(const Scene& scene) {
+  ordered_json background{{"kind", background_name(scene.background.kind)}};
+  if (scene.background.kind == BackgroundKind::kKnown) {
+    float rgb[3];
+    scene.transform.to_rgb(scene.background.mean, rgb);
+    background["color"] = {std::max(0.0f, rgb[0]), std::max(0.0f, rgb[1]), std::max(0.0f, rgb[2])};
+  }
+  return background;
+}
+
+ordered_json scene_json(const RunRecord& record) {
+  const Scene& scene = record.scene;
+  const Eigen::Vector3d low = scene.bounds.box.min(), high = scene.bounds.box.max();
+  const Eigen::Vector3i voxels = record.frame.size_in_voxels();
+  return {{"bounds", {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()}},
+          {"bounds_from", scene.bounds.how},
+          {"far", scene.bounds.far},
+          {"voxel_size", scene.voxel_size},
+          {"lattice_origin", numbers(record.frame.origin)},
+          {"lattice_voxels", {voxels.x(), voxels.y(), voxels.z()}},
+          {"surround_lattices", scene.surround_count},
+          {"color_space", to_string(scene.transform.space())},
+          {"white_point", to_string(scene.transform.white())},
+          {"exposure", scene.exposure},
+          {"background", background_json(scene)}};
+}
+
+ordered_json pass_json(const PassRecord& pass) {
+  return {{"level", pass.level},
+          {"pass", pass.pass},
+          {"active_voxels", pass.active_voxels},
+          {"rays", pass.rays},
+          {"steps", pass.steps},
+          {"color_steps", pass.color_steps},
+          {"mean_log_likelihood", pass.mean_log_likelihood},
+          {"mean_opacity_change", pass.mean_opacity_change},
+          {"mean_opacity", pass.mean_opacity},
+          {"seconds", pass.seconds},
+          {"color_seconds", pass.color_seconds},
+          {"opacity_seconds", pass.opacity_seconds},
+          {"ns_per_step", pass.ns_per_step}};
+}
+
+ordered_json level_json(const LevelRecord& level) {
+  return {{"voxel_size", level.voxel_size},
+          {"voxels_in_box", level.voxels_in_box},
+          {"voxels_around", level.voxels_around},
+          {"converged", level.converged},
+          {"seconds", level.seconds}};
+}
+
+ordered_json view_json(const ViewFigures& view) {
+  return {{"name", view.name},
+          {"hash", view.hash},
+          {"reprojection_rms_percent", or_null(view.reprojection_rms)},
+          {"object_pixels", view.object_pixels},
+          {"depth_share", or_null(view.depth_share)}};
+}
+
+template <class T, class ToJson>
+ordered_json list(const std::vector<T>& items, ToJson to) {
+  ordered_json array = ordered_json::array();
+  for (const T& item : items) array.push_back(to(item));
+  return array;
+}
+
+}  // namespace
+
+ordered_json to_json(const RunRecord& record) {
+  const Summary& summary = record.summary;
+  return {{"format", kFormat},
+          {"version", ROXEL_VERSION},
+          {"command", record.command_line},
+          {"dataset",
+           {{"path", record.dataset_path},
+            {"format", record.dataset_format},
+            {"images", record.views.size()},
+            {"nodes", record.nodes},
+            {"hash", record.dataset_hash}}},
+          {"options", record.options},
+          {"scene", scene_json(record)},
+          {"termination", summary.termination},
+          {"reprojection_rms_percent", or_null(record.reprojection_rms)},
+          {"levels", list(summary.levels, level_json)},
+          {"passes", list(summary.passes, pass_json)},
+          {"stages", list(summary.stages,
+                          [](const StageRecord& s) {
+                            return ordered_json{{"name", s.name}, {"seconds", s.seconds}};
+                          })},
+          {"seconds", summary.seconds},
+          {"threads", record.threads},
+          {"peak_memory_bytes", summary.peak_memory_bytes},
+          {"notes", summary.notes},
+          {"warnings", record.warnings},
+          {"views", list(record.views, view_json)}};
+}
+
+void add_to_hash(const View& view, const std::string& file_hash, std::string& combined) {
+  ContentHash hash;
+  hash.update(combined).update(view.name).update(file_hash);
+  const Intrinsics& k = view.camera.intrinsics;
+  std::vector<double> numbers{
+      static_cast<double>(k.width), static_cast<double>(k.height), k.fx, k.fy, k.cx, k.cy, k.skew};
+  numbers.insert(numbers.end(), view.camera.pose.rotation.data(), view.camera.pose.rotation.data() + 9);
+  numbers.insert(numbers.end(), view.camera.pose.centre.data(), view.camera.pose.centre.data() + 3);
+  for (const double number : numbers) {
+    char text[32];
+    std::snprintf(text, sizeof text, " %.17g", number);
+    hash.update(text);
+  }
+  combined = hash.hex();
+}
+
+const json& FinishedRun::option(const std::string& name) const {
+  static const json none;
+  const auto options = summary.find("options");
+  if (options == summary.end() || !options->contains(name)) return none;
+  return (*options)[name];
+}
+
+json read_summary(const fs::path& run) {
+  const fs::path file = run / "summary.json";
+  std::ifstream in(file);
+  if (!in) throw_invalid(run.string(), "no readable summary.json", "the folder of a finished run");
+  json summary;
+  try {
+    summary = json::parse(in);
+  } catch (const json::exception& error) {
+    throw_invalid(file.string(), std::string("a syntax error (") + error.what() + ")", "what roxel wrote");
+  }
+  const bool ours = summary.is_object() && summary.value("format", json()).is_number_integer();
+  if (!ours || summary["format"] != kFormat)
+    throw_invalid(file.string(), "another format", "format " + std::to_string(kFormat) + " of roxel");
+  return summary;
+}
+
+FinishedRun read_run(const fs::path& run) {
+  nlohmann::json summary = read_summary(run);
+  return {run, std::move(summary), read_volume(run / "volume.vdb")};
+}
+
+void remove_results(const fs::path& run) {
+  json summary;
+  try {
+    summary = read_summary(run);
+  } catch (const InvalidInput&) {
+    return;
+  }
+  std::error_code ignored;
+  fs::remove(run / "summary.json", ignored);
+  for (const char* name : {"volume.vdb", "voxels.ply", "overview.png"}) fs::remove(run / name, ignored);
+  for (const json& view : summary.value("views", json::array())) {
+    const std::string name = view.value("name", "");
+    if (name.empty()) continue;
+    for (const char* kind : {"depth", "render", "error"})
+      for (const char* suffix : {".png", ".exr"}) fs::remove(view_path(run, kind, name, suffix), ignored);
+  }
+}
+
+fs::path view_path(const fs::path& run, const std::string& kind, const std::string& name,
+                   const std::string& suffix) {
+  fs::path path = run / kind;
+  for (const auto& part : fs::path(name).relative_path())
+    if (part != "." && part != ".." && !part.empty()) path /= part;
+  path += suffix;
+  return path;
+}
+
+}  // namespace roxel

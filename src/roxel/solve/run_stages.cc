@@ -1,0 +1,126 @@
+#include "roxel/solve/run_stages.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "roxel/base/parallel.h"
+
+namespace roxel {
+namespace {
+
+constexpr std::size_t kViewsAtOnce = 16;
+
+/// Everything that the stages share, made once.
+class ViewStages {
+ public:
+  ViewStages(const Dataset& dataset, const PhotographLoader& load, const Reconstruction& reconstruction,
+             const ReconstructOptions& options, const ViewStageOptions& stages, RunContext& context)
+      : dataset_(dataset),
+        load_(load),
+        scene_(reconstruction.scene),
+        stages_(stages),
+        context_(context),
+        stack_(reconstruction.volume),
+        pass_(pass_options(scene_, options)),
+        totals_(stages.depth ? reconstruction.volume.slot_count() : 0),
+        scratch_(context.thread_count()) {
+    if (stages.render) colors_ = radiance_colors(reconstruction.volume, scene_.transform, scene_.exposure);
+    if (!stages.depth) return;
+    samples_ = make_samples(dataset, load, scene_, scene_.voxel_size, options, context);
+    collect_color(stack_, samples_, pass_, context, nullptr, totals_);
+  }
+
+  void work_on_node(int node, int worker, const std::function<void(const ViewResult&)>& visit) {
+    const std::vector<int>& views = dataset_.nodes[node].view_idxs;
+    for (std::size_t begin = 0; begin < views.size(); begin += kViewsAtOnce) {
+      const std::size_t end = std::min(begin + kViewsAtOnce, views.size());
+      std::vector<ViewResult> results(end - begin);
+      for (std::size_t i = begin; i < end; ++i) load_view(views[i], results[i - begin]);
+      if (stages_.depth) add_depth(node, worker, results);
+      for (ViewResult& result : results) {
+        if (stages_.render) result.rendering = render_view(result.view_idx);
+        visit(result);
+        report_one();
+      }
+    }
+  }
+
+ private:
+  void load_view(int view_idx, ViewResult& result) const {
+    context_.throw_if_cancelled();
+    result.view_idx = view_idx;
+    result.photo = load_(dataset_.views[view_idx]);
+  }
+
+  void add_depth(int node, int worker, std::vector<ViewResult>& results) {
+    SampleNode full;
+    for (const ViewResult& result : results)
+      full.push_back(make_full_view(dataset_, result.view_idx, result.photo, scene_));
+    if (!scratch_[worker]) scratch_[worker] = std::make_unique<NodeScratch>(stack_, stack_.volume().tau);
+    scratch_[worker]->reset();
+    std::vector<DepthMap> maps = estimate_depth(stack_, samples_[node], full, pass_, totals_,
+                                                stages_.depth_options, context_, *scratch_[worker]);
+    for (std::size_t i = 0; i < maps.size(); ++i) results[i].depth = std::move(maps[i]);
+  }
+
+  Rendering render_view(int view_idx) const {
+    RenderOptions options;
+    options.background = background_radiance(scene_);
+    return render(stack_, colors_, dataset_.views[view_idx].camera, view_range(scene_, dataset_, view_idx),
+                  options, context_);
+  }
+
+  void report_one() {
+    Progress progress;
+    progress.stage = stages_.depth ? "depth" : "render";
+    const double share = static_cast<double>(++done_) / static_cast<double>(dataset_.views.size());
+    progress.fraction = stages_.progress_begin + (stages_.progress_end - stages_.progress_begin) * share;
+    context_.report(progress);
+  }
+
+  const Dataset& dataset_;
+  const PhotographLoader& load_;
+  const Scene& scene_;
+  const ViewStageOptions& stages_;
+  RunContext& context_;
+  LatticeStack stack_;
+  PassOptions pass_;
+  Totals totals_;
+  std::vector<SampleNode> samples_;
+  std::vector<std::array<float, 3>> colors_;
+  std::vector<std::unique_ptr<NodeScratch>> scratch_;
+  std::atomic<int> done_{0};
+};
+
+}  // namespace
+
+void for_each_view_result(const Dataset& dataset, const PhotographLoader& load,
+                          const Reconstruction& reconstruction, const ReconstructOptions& options,
+                          const ViewStageOptions& stages, RunContext& context,
+                          const std::function<void(const ViewResult&)>& visit) {
+  if (!stages.depth && !stages.render) return;
+  ViewStages work(dataset, load, reconstruction, options, stages, context);
+  parallel_for(dataset.nodes.size(), context.thread_count(), [&](std::int64_t node, int worker) {
+    work.work_on_node(static_cast<int>(node), worker, visit);
+  });
+}
+
+std::vector<std::array<float, 3>> radiance_colors(const Volume& volume, const ColorTransform& transform,
+                                                  double exposure) {
+  std::vector<std::array<float, 3>> colors(volume.slot_count());
+  for (std::size_t slot = 0; slot < colors.size(); ++slot) {
+    transform.to_rgb(volume.color_mean[slot].data(), colors[slot].data());
+    for (float& value : colors[slot]) value *= static_cast<float>(exposure);
+  }
+  return colors;
+}
+
+std::array<float, 3> background_radiance(const Scene& scene) {
+  std::array<float, 3> color{0, 0, 0};
+  if (scene.background.kind != BackgroundKind::kKnown) return color;
+  scene.transform.to_rgb(scene.background.mean, color.data());
+  for (float& value : color) value = std::max(0.0f, value * static_cast<float>(scene.exposure));
+  return color;
+}
+
+}  // namespace roxel
