@@ -18,7 +18,7 @@ constexpr float kFarAway = 100.0f;
 const Vector3f kToSun = Vector3f(-0.55f, -0.62f, 0.62f).normalized();
 const Vector3f kSunColor(1.00f, 0.90f, 0.74f);
 const Vector3f kSkyColor(0.34f, 0.38f, 0.46f);
-const Vector3f kBounceColor(0.36f, 0.30f, 0.23f);
+const Vector3f kBounceColor(0.52f, 0.45f, 0.36f);
 
 /// Where a line is inside the scene's box; empty when begin > end.
 struct Interval {
