@@ -30,9 +30,9 @@ struct ReconstructOptions {
 
   // How images are sampled
   bool adaptive = true;
-  double samples_per_voxel = 2;
+  double samples_per_voxel = 1;
   bool interpolate = false;
-  double observation_weight = 4;
+  double observation_weight = 1;
 
   // Colour and its agreement
   ColorSpace color_space = ColorSpace::kLuv;
