@@ -1,8 +1,9 @@
-// Uses three modules of an installed roxel: a camera, a volume, and an error.
+// Uses an installed roxel: a camera, a volume, the reader of data sets, and an error.
 #include <cstdio>
 
 #include "roxel/base/error.h"
 #include "roxel/camera/camera.h"
+#include "roxel/io/dataset_reader.h"
 #include "roxel/volume/volume.h"
 
 int main() {
@@ -22,9 +23,10 @@ int main() {
   if (volume.slot_count() != 27) return std::puts("wrong number of voxels"), 1;
 
   try {
-    roxel::throw_invalid("here", "this", "that");
+    roxel::read_dataset("no such folder");
   } catch (const roxel::InvalidInput& error) {
     std::printf("roxel works: %s\n", error.what());
     return 0;
   }
+  return std::puts("a data set that is not there was read"), 1;
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <sstream>
 
 #include "roxel/base/option_table.h"
 #include "roxel/base/option_value.h"
@@ -52,13 +53,16 @@ std::string markdown_cell(const std::string& text) {
   return cell;
 }
 
+bool is_on_at_first(const OptionField& field) {
+  return field.is_switch() && field.default_value == OptionValue(true);
+}
+
 std::string markdown_row(const OptionField& field) {
   const std::string value = field.is_switch() ? "" : " " + placeholder_of(field);
   const std::string unit = field.unit.empty() ? "" : " (" + field.unit + ")";
   std::string row = "|";
   // "--no-adaptive | on" would leave the reader to guess which of the two is on.
-  const bool negated = field.is_switch() && field.default_value == OptionValue(true);
-  const std::string at_first = negated ? field.name + " is on" : field.default_text();
+  const std::string at_first = is_on_at_first(field) ? field.name + " is on" : field.default_text();
   for (const std::string& cell :
        {"`" + field.flag() + value + "`", at_first,
         field.is_switch() ? std::string() : field.expected() + unit, field.help, field.source})
@@ -66,20 +70,41 @@ std::string markdown_row(const OptionField& field) {
   return row + "\n";
 }
 
+/// What the flag does; a switch that is on at first is turned off by its flag.
+std::string effect(const OptionField& field) {
+  return is_on_at_first(field) ? "Turn off: " + field.help : field.help;
+}
+
+/// Breaks lines between words, `width` columns at most where words allow it; further lines are indented.
+std::string wrapped(const std::string& text, std::size_t indent, std::size_t width) {
+  std::istringstream words(text);
+  std::string lines;
+  std::size_t column = indent;
+  for (std::string word; words >> word;) {
+    const bool first = column == indent;
+    const bool fits = first || column + 1 + word.size() <= width;
+    if (!fits) lines += "\n" + std::string(indent, ' ');
+    if (fits && !first) lines += ' ';
+    column = (fits ? column + (first ? 0 : 1) : indent) + word.size();
+    lines += word;
+  }
+  return lines;
+}
+
 std::string help_entry(const OptionField& field) {
-  constexpr std::size_t kColumn = 34;
-  std::string line = "  " + field.flag();
-  if (!field.is_switch()) line += " " + placeholder_of(field);
-  line +=
-      line.size() + 2 > kColumn ? "\n" + std::string(kColumn, ' ') : std::string(kColumn - line.size(), ' ');
-  line += field.help;
-  if (field.is_switch()) return line + "\n";
+  constexpr std::size_t kIndent = 34, kWidth = 100;
+  const std::string margin = "\n" + std::string(kIndent, ' ');
+  std::string entry = "  " + field.flag();
+  if (!field.is_switch()) entry += " " + placeholder_of(field);
+  entry += entry.size() + 2 > kIndent ? margin : std::string(kIndent - entry.size(), ' ');
+  entry += wrapped(effect(field), kIndent, kWidth);
+  if (field.is_switch()) return entry + "\n";
   std::vector<std::string> notes;
   if (!field.unit.empty()) notes.push_back(field.unit);
   const std::string range = field.accepts_text.empty() ? range_text(field) : field.accepts_text;
   if (!range.empty()) notes.push_back(range);
   notes.push_back("default: " + field.default_text());
-  return line + "\n" + std::string(kColumn, ' ') + "[" + join(notes, "; ") + "]\n";
+  return entry + margin + wrapped("[" + join(notes, "; ") + "]", kIndent, kWidth) + "\n";
 }
 
 }  // namespace

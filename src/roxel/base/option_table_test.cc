@@ -367,10 +367,25 @@ TEST(OptionTable, RendersMarkdown) {
 
 TEST(OptionTable, RendersHelp) {
   const std::string help = kTable.help();
-  EXPECT_THAT(help, HasSubstr("Volume:\n  --no-adaptive                   Sample where there is detail\n"));
+  EXPECT_THAT(
+      help, HasSubstr("Volume:\n  --no-adaptive                   Turn off: Sample where there is detail\n"));
   EXPECT_THAT(help, HasSubstr("[world units; > 0; default: 0.25]"));
   EXPECT_THAT(help, HasSubstr("--bounds X0,Y0,Z0,X1,Y1,Z1"));
   EXPECT_THAT(help, HasSubstr("[in [1, 100]; default: 8]"));
+}
+
+TEST(OptionTable, HelpKeepsToAHundredColumns) {
+  std::string sentence;
+  for (int i = 0; i < 40; ++i) sentence += (i ? " word" : "word") + std::to_string(i);
+  OptionTable<PassOptions> table;
+  table.add("passes", &PassOptions::passes).help(sentence);
+  std::istringstream lines(table.help());
+  std::string unwrapped;
+  for (std::string line; std::getline(lines, line);) {
+    EXPECT_LE(line.size(), 100u) << line;
+    unwrapped += line.substr(std::min(line.size(), line.find_first_not_of(' '))) + " ";
+  }
+  EXPECT_THAT(unwrapped, HasSubstr(sentence + " [default: 8]"));
 }
 
 TEST(OptionTable, RefusesANameTwice) {
