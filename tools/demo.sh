@@ -17,12 +17,17 @@ echo "== photographs of a synthetic world -> $folder/photographs"
 echo "== reconstruction -> $folder/run"
 "$roxel" reconstruct "$folder/photographs" -o "$folder/run"
 
-first() { find "$1" -name "*.$2" 2>/dev/null | sort | head -n 1; }
+echo "== measured against the truth -> $folder/metrics"
+"$roxel" eval "$folder/run" --truth "$folder/photographs" -o "$folder/metrics"
+
+first() { find "$1" -name "*.$2" | sort | head -n 1; }
 echo
-echo "Done. Compare, for the first camera:"
-echo "  photograph        $(first "$folder/photographs" png)"
+echo "Look at $folder/run/overview.png: photograph, rendered volume, depth, error."
+echo
+echo "For the first camera:"
+echo "  photograph        $(first "$folder/photographs/images" png)"
 echo "  volume rendered   $(first "$folder/run/render" png)"
-echo "  difference        $(first "$folder/run/error" png)"
-echo "  depth             $(first "$folder/run/depth" exr)"
-echo "All cameras: $folder/run/render, $folder/run/error, $folder/run/depth"
+echo "  error             $(first "$folder/run/error" png)"
+echo "  depth             $(first "$folder/run/depth" png)"
+echo "The volume for Blender or vdb_view: $folder/run/volume.vdb"
 echo "What was done and what it cost: $folder/run/summary.json"
