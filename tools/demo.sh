@@ -15,7 +15,7 @@ mkdir -p "$folder"
 echo "== photographs of a synthetic world -> $folder/photographs"
 "$roxel" synth demo -o "$folder/photographs"
 echo "== reconstruction -> $folder/run"
-"$roxel" reconstruct "$folder/photographs" -o "$folder/run"
+"$roxel" reconstruct "$folder/photographs" -o "$folder/run" --resolution 128
 
 echo "== measured against the truth -> $folder/metrics"
 "$roxel" eval "$folder/run" --truth "$folder/photographs" -o "$folder/metrics"
