@@ -22,11 +22,12 @@ bool takes_many(const CommandForm& form) { return form.input.ends_with("..."); }
                                 const std::vector<std::string>& unknown) {
   for (const std::string& argument : unknown) {
     if (argument.size() < 2 || argument[0] != '-') continue;
+    if (argument[1] != '-') throw_usage(form, "\"" + argument + "\" is no option");
     struct Nothing {};
     internal::OptionTableCore known;
     known.fields = fields;
     Nothing nothing;
-    const std::string name = argument.substr(argument.find_first_not_of('-'));
+    const std::string name = argument.substr(2);
     known.set(&nothing, name.substr(0, name.find('=')), "", "");  // throws with the names that are near
   }
   throw_usage(form, "\"" + unknown.front() + "\" was not expected");

@@ -27,7 +27,7 @@ struct ConvertOptions {
 
 OptionTable<ConvertOptions> convert_table() {
   OptionTable<ConvertOptions> table;
-  table.group("Result");
+  table.group("Converted data set");
   table.add("to", &ConvertOptions::to, {{"transforms", Target::kTransforms}, {"colmap", Target::kColmap}})
       .help("Format of the result");
   table.include(input_option_table(), &ConvertOptions::input);

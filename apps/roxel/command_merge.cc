@@ -20,7 +20,7 @@ struct MergeCommandOptions {
 
 OptionTable<MergeCommandOptions> merge_table() {
   OptionTable<MergeCommandOptions> table;
-  table.group("Result");
+  table.group("Merged volume");
   table.add("opacity-threshold", &MergeCommandOptions::opacity_threshold)
       .help("Voxels below this opacity are left out of voxels.ply")
       .range(0, 0.999)

@@ -42,8 +42,9 @@ OptionTable<StageSwitches> stage_table() {
       .unset("none");
   table.add("dry-run", &StageSwitches::dry_run)
       .help("Say what would be done, and what memory and time it would take");
-  table.add("depth", &StageSwitches::depth).help("Leave out depth maps");
-  table.add("render", &StageSwitches::render).help("Leave out renders and errors of the input views");
+  table.add("depth", &StageSwitches::depth).help("Depth maps: depth/NAME.exr and .png");
+  table.add("render", &StageSwitches::render)
+      .help("Pictures of the input views: render/NAME.png and error/NAME.png");
   table.add("save-surround", &StageSwitches::save_surround)
       .help("Keep the voxels around the box in volume.vdb");
   return table;
@@ -196,6 +197,9 @@ class Run {
     made_.summary.peak_memory_bytes = peak_memory_bytes();
     const std::string json = json_text(to_json(make_record(session.context().thread_count())));
     write_text_atomically(invocation_.output / "summary.json", json + "\n");
+    for (const std::string& note : made_.summary.notes) session.display().detail(note);
+    for (const StageRecord& stage : made_.summary.stages)
+      session.display().detail(stage.name + ": " + duration_text(stage.seconds));
     session.display().clear();
     print_result(options_.common, brief(), json);
   }

@@ -1,11 +1,13 @@
 /// roxel COMMAND ...: finds the command, runs it, and turns errors into one line and an exit code.
 
 #include <cstdio>
-#include <cstring>
 #include <new>
+#include <set>
+#include <sstream>
 
 #include "command.h"
 #include "roxel/base/error.h"
+#include "roxel/solve/options.h"
 
 namespace roxel::cli {
 namespace {
@@ -34,12 +36,36 @@ std::string overview(const Commands& commands) {
   return text + "\nroxel COMMAND --help explains a command, roxel --version names the program.\n";
 }
 
-/// The tables of docs/options.md.
+/// A table of options under one heading.
+struct OptionGroup {
+  std::string name, table;
+};
+
+std::vector<OptionGroup> groups_of(const std::string& markdown) {
+  std::vector<OptionGroup> groups;
+  std::istringstream lines(markdown);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("### "))
+      groups.push_back({line.substr(4), ""});
+    else if (!groups.empty() && !line.empty())
+      groups.back().table += line + "\n";
+  }
+  return groups;
+}
+
+/// The end of docs/commands.md: each table once; those of reconstruct have their own page.
 void print_markdown(const Commands& commands) {
-  std::printf("# Options of every command\n\nMade from the program by `roxel help-markdown`; do not edit.\n");
+  std::printf("## Options\n\nMade by `roxel help-markdown`; a test compares.\n");
+  std::set<std::string> known;
+  for (const OptionGroup& group : groups_of(reconstruct_option_table().markdown())) known.insert(group.name);
   for (const auto& command : commands) {
-    std::printf("\n## roxel %s\n\n%s.\n\n%s", command->form().name.c_str(), command->form().summary.c_str(),
-                command->options_markdown().c_str());
+    std::string list;
+    for (const OptionGroup& group : groups_of(command->options_markdown())) {
+      list += (list.empty() ? "" : ", ") + group.name;
+      if (known.insert(group.name).second)
+        std::printf("\n### %s\n\n%s", group.name.c_str(), group.table.c_str());
+    }
+    std::printf("\n`roxel %s` takes: %s.\n", command->form().name.c_str(), list.c_str());
   }
 }
 

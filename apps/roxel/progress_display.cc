@@ -69,6 +69,10 @@ void ProgressDisplay::line(const std::string& text) {
   std::fflush(out_);
 }
 
+void ProgressDisplay::detail(const std::string& text) {
+  if (talk_ == Talk::kVerbose) line(text);
+}
+
 void ProgressDisplay::clear() {
   std::lock_guard lock(mutex_);
   erase();

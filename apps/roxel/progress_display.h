@@ -25,6 +25,8 @@ class ProgressDisplay {
   void update(const Progress& progress);
   /// A line of its own: always off a terminal, on one only when verbose.
   void line(const std::string& text);
+  /// A line of its own, when verbose.
+  void detail(const std::string& text);
   /// Takes the bar away.
   void clear();
 

@@ -190,6 +190,7 @@ void write_exr(const std::string& path, const std::vector<FloatChannel>& channel
   spec.alpha_channel = -1;  // planes are numbers, not colours: nothing is multiplied by a plane called A
   spec.z_channel = -1;
   spec.attribute("compression", "zip");
+  spec.attribute("DateTime", "1970:01:01 00:00:00");  // else it is now, and equal pixels make unequal files
   write_with(path, "openexr", spec, OIIO::TypeFloat, values.data());
 }
 

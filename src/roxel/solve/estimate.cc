@@ -1,26 +1,140 @@
+// The model. A level's voxels: at first, the cells of its lattices that some view sees. Later, sheets around
+// surfaces and what has not been carved yet: on real scenes their number is about 3.6 sqrt(N) times the
+// number of cells in the box's mean cross-section, N being the box's mean side in cells. Rays cross as many
+// of them as lie behind each other, times a share. Everything else is counting bytes and nanoseconds.
 #include "roxel/solve/estimate.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "roxel/dataset/box_visibility.h"
+#include "roxel/image/sample_pyramid.h"
 #include "roxel/march/sample_plan.h"
 
 namespace roxel {
 namespace {
 
-// Bytes a voxel: channels of the volume; totals of a pass; and a worker's scratch.
+// Measured on plane, head, templeSparseRing and dtu-scan24 (with and without masks), at 64 to 256 voxels.
+constexpr double kSheetFactor = 3.6;
+constexpr double kCrossedShare = 0.43;
+constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
+constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level
+constexpr double kSurroundShare = 0.22;      ///< of the box's voxels, for each surround lattice
+constexpr double kSurroundSteps = 8;         ///< more steps a ray for each surround lattice
+constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
+
+// Nanoseconds on one core: a ray-voxel step of the colour and the opacity march, loading a pixel.
+constexpr double kColorStepNs = 45;
+constexpr double kOpacityStepNs = 45;
+constexpr double kLoadPixelNs = 60;
+
+// Bytes a voxel: channels of the volume, totals of a pass, and a worker's scratch.
 constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8;
 constexpr double kTotalsBytes = 80 + 24;
 constexpr double kScratchBytes = 64;
+constexpr double kVoxelsPerBrick = 180;
+constexpr double kWritingBytesPerBrick = 36 * 1024;
+constexpr double kProgramBytes = 110e6;  ///< libraries
+constexpr double kDecodedBytesPerPixel = 40;
+
+double pixel_count(const View& view) {
+  return static_cast<double>(view.camera.intrinsics.width) * view.camera.intrinsics.height;
+}
+
+/// Bytes of a SamplePyramid.
+double pyramid_bytes(double pixels, int finest_level) {
+  constexpr double kRegion = sizeof(RegionStats);
+  if (finest_level == 0) return pixels * (14 + kRegion / 3);
+  return pixels * std::ldexp(1.0, -2 * finest_level) * kRegion * 4 / 3;
+}
+
+/// What the images of a level amount to.
+struct SampleLoad {
+  double rays = 0;
+  double bytes = 0;
+};
+
+SampleLoad sample_load(const Dataset& dataset, const Scene& scene, double voxel_size,
+                       const ReconstructOptions& options) {
+  SampleLoad load;
+  SamplePlanOptions plan_options;
+  plan_options.samples_per_voxel = options.samples_per_voxel;
+  plan_options.adaptive = options.adaptive;
+  for (std::size_t v = 0; v < dataset.views.size(); ++v) {
+    const View& view = dataset.views[v];
+    const SamplePlan plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size,
+                                             view_range(scene, dataset, static_cast<int>(v)), plan_options);
+    load.rays += kRaysPerSample * pixel_count(view) * std::ldexp(1.0, -2 * plan.finest_level);
+    load.bytes += pyramid_bytes(pixel_count(view), plan.finest_level);
+  }
+  return load;
+}
+
+/// Voxels that a ray crosses in the box, and how many there are.
+struct BoxVoxels {
+  double count = 0;
+  double crossed = 0;
+};
+
+BoxVoxels box_voxels(const Eigen::Vector3d& cells, bool first_level) {
+  const double all = cells.prod();
+  const double mean_side = cells.mean();
+  const double cross_section = (cells.x() * cells.y() + cells.y() * cells.z() + cells.z() * cells.x()) / 3;
+  if (first_level) return {all, kCrossedShare * mean_side};
+  const double behind_each_other = kSheetFactor * std::sqrt(mean_side);
+  const double count = std::min(kFilledShare * all, cross_section * behind_each_other);
+  return {count, kCrossedShare * std::min(behind_each_other, mean_side)};
+}
+
+LevelEstimate estimate_level(const Scene& scene, double voxel_size, bool first_level, double rays) {
+  const Eigen::Vector3d cells =
+      nested_frames(scene.bounds.box, voxel_size, scene.surround_count)[0].size_in_voxels().cast<double>();
+  const Eigen::Vector3d used = first_level ? cells : Eigen::Vector3d(scene.bounds.box.sizes() / voxel_size);
+  const BoxVoxels box = box_voxels(used, first_level);
+  LevelEstimate level;
+  level.voxel_size = voxel_size;
+  const double per_lattice =
+      first_level ? kFirstSurroundShare * cells.prod() * 7 / 8 : kSurroundShare * box.count;
+  level.voxels = box.count + scene.surround_count * per_lattice;
+  level.steps_per_pass = rays * (box.crossed + kSurroundSteps * scene.surround_count);
+  return level;
+}
+
+/// Resident memory while a level's passes run, or while the volume is written.
+double level_bytes(const LevelEstimate& level, const SampleLoad& load, double largest_image, int threads) {
+  const double bricks = level.voxels / kVoxelsPerBrick;
+  const double volume = level.voxels * kChannelBytes + bricks * sizeof(Brick);
+  const double passing = level.voxels * (kTotalsBytes + kScratchBytes * threads) + load.bytes;
+  const double loading = load.bytes + threads * largest_image * kDecodedBytesPerPixel;
+  return kProgramBytes + volume + std::max({passing, loading, bricks * kWritingBytesPerBrick});
+}
 
 }  // namespace
 
 CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
                            int threads) {
+  double all_pixels = 0, largest_image = 0;
+  for (const View& view : dataset.views) {
+    all_pixels += pixel_count(view);
+    largest_image = std::max(largest_image, pixel_count(view));
+  }
   CostEstimate cost;
-  (void)dataset, (void)scene, (void)options, (void)threads;
-  cost.memory_bytes = kChannelBytes + kTotalsBytes + kScratchBytes;
+  double core_ns = all_pixels * kLoadPixelNs;  // survey
+  for (int level = 0; level < options.levels; ++level) {
+    const double voxel_size = std::ldexp(scene.voxel_size, options.levels - 1 - level);
+    const SampleLoad load = sample_load(dataset, scene, voxel_size, options);
+    const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays);
+    const double colour_marches = options.predictive ? 2 : 1;
+    core_ns += all_pixels * kLoadPixelNs;
+    core_ns += options.passes * estimate.steps_per_pass * (colour_marches * kColorStepNs + kOpacityStepNs);
+    cost.memory_bytes = std::max(cost.memory_bytes, level_bytes(estimate, load, largest_image, threads));
+    cost.levels.push_back(estimate);
+  }
+  // Depth and renders look along the ray of every pixel.
+  core_ns += all_pixels * (2 * kLoadPixelNs +
+                           cost.levels.back().steps_per_pass /
+                               std::max(1.0, sample_load(dataset, scene, scene.voxel_size, options).rays) *
+                               (2 * kColorStepNs + kOpacityStepNs));
+  cost.seconds = 1e-9 * core_ns / threads;
   return cost;
 }
 

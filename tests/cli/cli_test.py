@@ -1,0 +1,522 @@
+#!/usr/bin/env python3
+"""Tests of the command line, through the program itself, on tiny synthetic data sets.
+
+    cli_test.py ROXEL [unittest arguments, e.g. Usage or Options.test_every_option_changes_something]
+"""
+
+import hashlib
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROXEL = None  # the program, set in main
+TINY = ["--resolution", "16", "--levels", "2", "--passes", "2"]
+
+
+def run(*arguments, **kwargs):
+    """Runs roxel and returns what it said."""
+    return subprocess.run([ROXEL, *map(str, arguments)], capture_output=True, text=True, timeout=120, **kwargs)
+
+
+def files_below(folder):
+    return sorted(str(p.relative_to(folder)) for p in pathlib.Path(folder).rglob("*") if p.is_file())
+
+
+def digest(path):
+    return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+
+
+class Case(unittest.TestCase):
+    """A folder of its own with a data set of four photographs, 64 x 48."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-cli-"))
+        cls.data = cls.folder / "data"
+        cls.synth(cls.data, 4, "64x48")
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder, ignore_errors=True)
+
+    @classmethod
+    def synth(cls, folder, images, size):
+        made = run("synth", "demo", "-o", folder, "--images", images, "--size", size)
+        assert made.returncode == 0, made.stderr
+
+    def succeed(self, *arguments, **kwargs):
+        done = run(*arguments, **kwargs)
+        self.assertEqual(done.returncode, 0, f"roxel {' '.join(map(str, arguments))}\n{done.stderr}")
+        return done
+
+    def expect_error(self, code, message, *arguments):
+        """The command ends with this code and one line that holds `message`."""
+        done = run(*arguments)
+        line = f"roxel {' '.join(map(str, arguments))}"
+        self.assertEqual(done.returncode, code, f"{line}\n{done.stderr}")
+        self.assertEqual(done.stderr.count("\n"), 1, f"{line}\n{done.stderr}")
+        self.assertTrue(done.stderr.startswith("roxel: error: "), done.stderr)
+        self.assertIn(message, done.stderr, line)
+        self.assertEqual(done.stdout, "")
+        return done
+
+    def reconstruct(self, name, *arguments, data=None):
+        """A tiny run; its folder and its summary."""
+        out = self.folder / name
+        self.succeed("reconstruct", data or self.data, "-o", out, *TINY, *arguments, "--quiet")
+        return out, json.loads((out / "summary.json").read_text())
+
+
+class Usage(Case):
+    def test_bad_command_lines_end_with_code_2_and_write_nothing(self):
+        out = self.folder / "never"
+        table = [
+            ('unknown command "paint"', ["paint"]),
+            ("DATASET is missing", ["info"]),
+            ("DATASET is missing", ["reconstruct", "-o", out]),
+            ("-o RUN is missing", ["reconstruct", self.data]),
+            ('found "more" after', ["reconstruct", self.data, "more", "-o", out]),
+            ("--resolutoin: found an unknown option, expected perhaps resolution",
+             ["reconstruct", self.data, "-o", out, "--resolutoin", "16"]),
+            ('"-q" is no option', ["reconstruct", self.data, "-o", out, "-q"]),
+            ("--passes: found no value", ["reconstruct", self.data, "-o", out, "--passes"]),
+            ('--passes: found "x"', ["reconstruct", self.data, "-o", out, "--passes", "x"]),
+            ('--resolution: found "3", expected a whole number in [8, 65536]',
+             ["reconstruct", self.data, "-o", out, "--resolution", "3"]),
+            ("--background: found", ["reconstruct", self.data, "-o", out, "--background", "green"]),
+            ("--bounds: found", ["reconstruct", self.data, "-o", out, "--bounds", "0,0,0,1,1"]),
+            ("first corner must be below", ["reconstruct", self.data, "-o", out, "--bounds", "1,0,0,0,1,1"]),
+            ("--near must be below --far", ["reconstruct", self.data, "-o", out, "--near", "9", "--far", "3"]),
+            ("--white-point", ["reconstruct", self.data, "-o", out, "--white-point", "D66"]),
+            ("--response", ["reconstruct", self.data, "-o", out, "--response", "log"]),
+            ("nothing-here", ["info", self.folder / "nothing-here"]),
+            ("nothing-here", ["reconstruct", self.data, "-o", out, "--init", self.folder / "nothing-here"]),
+            ("summary.json", ["render", self.data, "-o", out]),
+            ("summary.json", ["eval", self.data]),
+            ("expected at least 2", ["merge", self.data, "-o", out]),
+            ('"paris"', ["synth", "paris", "-o", out]),
+            ("--size", ["synth", "demo", "-o", out, "--size", "64"]),
+            ("--images: found", ["synth", "demo", "-o", out, "--images", "1"]),
+            ("--to: found", ["convert", self.data, "-o", out, "--to", "bundler"]),
+            ("the data set itself", ["convert", self.data, "-o", self.data]),
+        ]
+        for message, arguments in table:
+            with self.subTest(message):
+                self.expect_error(2, message, *arguments)
+                self.assertFalse(out.exists())
+
+    def test_without_a_command_usage_goes_to_stderr_with_code_2(self):
+        done = run()
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("reconstruct", done.stderr)
+
+    def test_help_and_version_succeed(self):
+        for command in ["info", "reconstruct", "render", "eval", "merge", "synth", "convert"]:
+            text = self.succeed(command, "--help").stdout
+            self.assertIn(f"Usage: roxel {command} ", text)
+            self.assertIn("--config", text)
+            self.assertIn(f"\n  {command} ", self.succeed("--help").stdout)
+        self.assertRegex(self.succeed("--version").stdout, r"^roxel \d+\.\d+\.\d+$")
+
+    def test_an_output_that_cannot_be_written_fails_with_code_1_before_the_work(self):
+        blocker = self.folder / "blocker"
+        blocker.write_text("a file")
+        for command in (["reconstruct", self.data], ["synth", "demo"], ["convert", self.data]):
+            with self.subTest(command[0]):
+                self.expect_error(1, "cannot be made", *command, "-o", blocker / "run")
+                self.expect_error(1, "cannot be made", *command, "-o", blocker)
+        self.assertEqual(blocker.read_text(), "a file")
+
+    def test_a_broken_photograph_ends_with_code_2_and_leaves_no_folder(self):
+        broken = self.folder / "broken"
+        shutil.copytree(self.data, broken)
+        (broken / "images/002.png").write_bytes((broken / "images/002.png").read_bytes()[:500])
+        self.expect_error(2, "002.png", "reconstruct", broken, "-o", self.folder / "deep/run", *TINY)
+        self.assertFalse((self.folder / "deep").exists())
+
+    def test_a_dry_run_writes_nothing_and_says_what_info_says(self):
+        before = files_below(self.folder)
+        out = self.folder / "dry"
+        for extra in ([], ["-o", out]):
+            dry = self.succeed("reconstruct", self.data, *extra, *TINY, "--dry-run").stdout
+            self.assertEqual(dry, self.succeed("info", self.data, *TINY).stdout)
+        self.assertEqual(files_below(self.folder), before)
+        self.assertFalse(out.exists())
+
+
+class Config(Case):
+    def config(self, text):
+        file = self.folder / "config.json"
+        file.write_text(text)
+        return file
+
+    def test_the_command_line_overrides_the_file(self):
+        file = self.config('{"passes": 1, "levels": 1, "adaptive": false, "threads": 1}')
+        _, summary = self.reconstruct("a", "--config", file)
+        self.assertEqual([summary["options"][k] for k in ("passes", "levels", "adaptive")], [2, 2, False])
+        out = self.folder / "b"
+        self.succeed("reconstruct", self.data, "-o", out, "--resolution", "16", "--config", file, "--adaptive", "--quiet")
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertEqual([summary["options"][k] for k in ("passes", "levels", "adaptive")], [1, 1, True])
+        self.assertEqual(summary["threads"], 1)
+        self.assertEqual(len(summary["passes"]), 1)
+
+    def test_options_of_a_summary_make_the_same_run(self):
+        _, first = self.reconstruct("first", "--noise", "6", "--spatial-prior", "0.5", "--bounds", "-1,-1.5,-1,1,1.5,1")
+        file = self.config(json.dumps(first["options"]))
+        self.succeed("reconstruct", self.data, "-o", self.folder / "second", "--config", file)
+        second = json.loads((self.folder / "second/summary.json").read_text())
+        self.assertEqual(first["options"], second["options"])
+        self.assertEqual(first["views"], second["views"])
+
+    def test_mistakes_in_the_file_name_the_file_and_the_key(self):
+        out = self.folder / "never"
+        for text, message in [('{"pases": 3}', '"pases": found an unknown option'), ('{"passes": "many"}', '"passes"'),
+                              ('{"passes": 3, "passes": 4}', "twice"), ("[]", "object"), ('{"passes": 3', "syntax"),
+                              ('{"near": 3, "far": 2}', "--near must be below --far")]:
+            with self.subTest(text):
+                self.expect_error(2, message, "reconstruct", self.data, "-o", out, "--config", self.config(text))
+        self.expect_error(1, "missing.json", "reconstruct", self.data, "-o", out, "--config", self.folder / "missing.json")
+        self.assertFalse(out.exists())
+
+
+# Each option of `reconstruct`: what the run has besides, and a value that must change its result.
+BLACK = ["--masks", "none"]  # the demo's black background is then a known colour
+UNKNOWN = ["--masks", "none", "--background", "unknown"]
+CHANGES = {
+    "adaptive": (["--samples-per-voxel", "1"], ["--no-adaptive"]),
+    "agreement": ([], ["--agreement", "linear"]),
+    "agreement-scale": (["--agreement", "exponential"], ["--agreement-scale", "40"]),
+    "all-passes": (["--tolerance", "0.5"], ["--all-passes"]),
+    "background": (BLACK, ["--background", "none"]),
+    "background-color": (BLACK + ["--background", "constant"], ["--background-color", "0.2,0.1,0.4"]),
+    "bounds": ([], ["--bounds", "-1,-1,-1,1,1,1"]),
+    "color-space": ([], ["--color-space", "hsv"]),
+    "confidence-threshold": ([], ["--confidence-threshold", "0.5"]),
+    "evidence-half": ([], ["--evidence-half", "2"]),
+    "far": ([], ["--far", "5"]),
+    "filter-background": (BLACK, ["--filter-background"]),
+    "filter-rays": ([], ["--filter-rays"]),
+    "format": ([], ["--format", "colmap"]),
+    "images": ([], ["--images", "00[012]*"]),
+    "interpolate": ([], ["--interpolate"]),
+    "levels": ([], ["--levels", "1"]),
+    "masks": ([], ["--masks", "none"]),
+    "near": ([], ["--near", "5"]),
+    "nodes": ([], ["--nodes", "1:4"]),
+    "noise": ([], ["--noise", "9"]),
+    "observation-weight": ([], ["--observation-weight", "6"]),
+    "opacity-threshold": ([], ["--opacity-threshold", "0.3"]),
+    "outlier": ([], ["--outlier", "0.01"]),
+    "passes": ([], ["--passes", "1"]),
+    "predictive": ([], ["--no-predictive"]),
+    "prior-opacity": ([], ["--prior-opacity", "0.1"]),
+    "prior-strength": ([], ["--prior-strength", "50"]),
+    "ray-weights": ([], ["--ray-weights"]),
+    "resolution": ([], ["--resolution", "24"]),
+    "response": ([], ["--response", "linear"]),
+    "samples-per-voxel": ([], ["--samples-per-voxel", "0.5"]),
+    "spatial-prior": ([], ["--spatial-prior", "0"]),
+    "surround": (UNKNOWN, ["--surround", "off"]),
+    "tolerance": ([], ["--tolerance", "0.5"]),
+    "uninformative": ([], ["--uninformative", "0.1"]),
+    "update": ([], ["--update", "roxels"]),
+    "voxel-size": ([], ["--voxel-size", "0.3"]),
+    "white-point": ([], ["--white-point", "A"]),
+}
+# Options that change files or what is said, and not the numbers; the tests of Switches are theirs.
+ELSEWHERE = {"depth", "dry-run", "init", "json", "quiet", "render", "save-surround", "threads", "verbose"}
+
+
+def numbers(summary):
+    """What a run found, apart from how it was asked for and how long it took."""
+    kept = {k: summary[k] for k in ("termination", "levels", "passes", "views", "reprojection_rms_percent")}
+    kept = json.loads(json.dumps(kept))
+    for record in kept["levels"] + kept["passes"]:
+        for key in list(record):
+            if "seconds" in key or key == "ns_per_step":
+                del record[key]
+    return kept
+
+
+class Options(Case):
+    def test_every_option_has_a_case(self):
+        _, summary = self.reconstruct("names")
+        self.assertEqual(set(summary["options"]), set(CHANGES) | ELSEWHERE)
+
+    def test_every_option_changes_something(self):
+        known = {}
+        for option, (base, change) in CHANGES.items():
+            with self.subTest(option):
+                key = tuple(base)
+                if key not in known:
+                    known[key] = self.result(base)
+                changed = self.result(base + change)
+                self.assertNotEqual(known[key], changed)
+
+    def result(self, arguments):
+        out, summary = self.reconstruct("run", *arguments)
+        # What decides about the photographs' reading is part of the result, too.
+        return numbers(summary), summary["dataset"]["format"], digest(out / "voxels.ply")
+
+    def test_every_option_is_in_help_and_in_the_docs(self):
+        text = self.succeed("reconstruct", "--help").stdout
+        docs = (SOURCE / "docs/options.md").read_text() + (SOURCE / "docs/commands.md").read_text()
+        for option in set(CHANGES) | ELSEWHERE:
+            pattern = rf"--(no-)?{option}\b"
+            self.assertRegex(text, pattern)
+            self.assertRegex(docs, pattern)
+
+    def test_the_options_in_the_docs_are_those_of_the_program(self):
+        page = (SOURCE / "docs/commands.md").read_text()
+        made = self.succeed("help-markdown").stdout
+        self.assertEqual(page[page.index(made.split("\n", 1)[0]):], made,
+                         "docs/commands.md: its end is what `roxel help-markdown` prints")
+
+
+class Switches(Case):
+    def test_stages_can_be_left_out(self):
+        out, summary = self.reconstruct("bare", "--no-depth", "--no-render")
+        self.assertEqual(files_below(out), ["summary.json", "volume.vdb", "voxels.ply"])
+        self.assertIsNone(summary["reprojection_rms_percent"])
+        out, summary = self.reconstruct("depth-only", "--no-render")
+        self.assertEqual(files_below(out / "depth"), [f"00{i}.{s}" for i in range(4) for s in ("exr", "png")])
+        self.assertFalse((out / "render").exists() or (out / "error").exists())
+        out, summary = self.reconstruct("render-only", "--no-depth")
+        self.assertEqual(files_below(out / "error"), [f"00{i}.png" for i in range(4)])
+        self.assertFalse((out / "depth").exists())
+        self.assertLess(summary["reprojection_rms_percent"], 40)
+
+    def test_surround_is_saved_only_when_asked_for(self):
+        plain, _ = self.reconstruct("plain", *UNKNOWN)
+        all_lattices, summary = self.reconstruct("all", *UNKNOWN, "--save-surround")
+        self.assertGreater(summary["scene"]["surround_lattices"], 0)
+        self.assertGreater(summary["levels"][-1]["voxels_around"], 0)
+        self.assertGreater((all_lattices / "volume.vdb").stat().st_size, (plain / "volume.vdb").stat().st_size)
+
+    def test_init_goes_on_from_a_run(self):
+        first, summary = self.reconstruct("first")
+        _, fresh = self.reconstruct("fresh", "--levels", "1")
+        _, warm = self.reconstruct("warm", "--levels", "1", "--init", first)
+        rms = "reprojection_rms_percent"
+        self.assertLess(warm[rms], fresh[rms])
+        self.expect_error(2, "--color-space", "reconstruct", self.data, "-o", self.folder / "never", *TINY, "--init", first,
+                  "--color-space", "rgb")
+
+    def test_quiet_is_silent_and_verbose_says_more(self):
+        arguments = ["reconstruct", self.data, "-o", self.folder / "talk", *TINY]
+        quiet = self.succeed(*arguments, "--quiet")
+        self.assertEqual(quiet.stdout + quiet.stderr, "")
+        normal = self.succeed(*arguments)
+        self.assertEqual(len(re.findall(r"level \d/2 pass \d/2: \d+ voxels", normal.stderr)), 4)
+        verbose = self.succeed(*arguments, "--verbose")
+        self.assertIn("background: mask", verbose.stderr)
+        self.assertNotIn("background: mask", normal.stderr)
+
+    def test_json_is_the_summary(self):
+        out = self.folder / "json"
+        done = self.succeed("reconstruct", self.data, "-o", out, *TINY, "--json")
+        self.assertEqual(json.loads(done.stdout), json.loads((out / "summary.json").read_text()))
+        for command in (["info", self.data], ["reconstruct", self.data, "--dry-run"], ["eval", out],
+                        ["render", out, "-o", self.folder / "views"], ["synth", "demo", "-o", self.folder / "small"],
+                        ["convert", self.data, "-o", self.folder / "converted"]):
+            with self.subTest(command[0]):
+                size = ["--images", "2", "--size", "16x16"] if command[0] == "synth" else []
+                self.assertIsInstance(json.loads(self.succeed(*command, *size, "--json").stdout), dict)
+
+
+class Files(Case):
+    def test_a_run_holds_what_the_format_page_lists(self):
+        out, summary = self.reconstruct("run")
+        views = [f"00{i}" for i in range(4)]
+        expected = ["summary.json", "volume.vdb", "voxels.ply", "overview.png"]
+        expected += [f"depth/{v}.exr" for v in views]
+        expected += [f"{kind}/{v}.png" for kind in ("depth", "render", "error") for v in views]
+        self.assertEqual(files_below(out), sorted(expected))
+        self.assertEqual([v["name"] for v in summary["views"]], views)
+        for view in summary["views"]:
+            self.assertEqual(len(view["hash"]), 16)
+            self.assertGreater(view["object_pixels"], 100)
+            self.assertTrue(0.05 < view["depth_share"] < 0.9)
+        self.assertEqual(len(summary["passes"]), 4)
+        self.assertEqual(len(summary["levels"]), 2)
+
+    def test_hashes_tell_data_sets_apart(self):
+        other = self.folder / "other"
+        shutil.copytree(self.data, other)
+        shutil.copy(other / "images/000.png", other / "images/001.png")
+        _, first = self.reconstruct("run")
+        _, second = self.reconstruct("other-run", data=other)
+        self.assertEqual(first["views"][0]["hash"], second["views"][0]["hash"])
+        self.assertNotEqual(first["views"][1]["hash"], second["views"][1]["hash"])
+        self.assertNotEqual(first["dataset"]["hash"], second["dataset"]["hash"])
+
+    def test_a_second_run_leaves_nothing_of_the_first(self):
+        out, _ = self.reconstruct("twice")
+        mine = out / "depth/mine.txt"
+        mine.write_text("not roxel's")
+        self.reconstruct("twice", "--images", "00[01].png")
+        self.assertEqual([f for f in files_below(out / "depth")], ["000.exr", "000.png", "001.exr", "001.png", "mine.txt"])
+
+    def test_results_do_not_depend_on_threads(self):
+        runs = []
+        for threads in (1, 2, 4):
+            out, summary = self.reconstruct(f"threads{threads}", "--threads", threads)
+            self.assertEqual(summary["threads"], threads)
+            names = [f for f in files_below(out) if f.endswith((".ply", ".png", ".exr"))]
+            runs.append((numbers(summary), summary["dataset"], {f: digest(out / f) for f in names}))
+        self.assertEqual(runs[0], runs[1])
+        self.assertEqual(runs[0], runs[2])
+
+
+class OtherCommands(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.run_folder = cls.folder / "base"
+        done = run("reconstruct", cls.data, "-o", cls.run_folder, *TINY, "--passes", "4")
+        assert done.returncode == 0, done.stderr
+
+    def test_render_from_the_own_cameras_is_the_run_s_render(self):
+        out = self.folder / "views"
+        self.succeed("render", self.run_folder, "--cameras", self.data, "-o", out)
+        self.assertEqual(len(files_below(out)), 4 * 4)
+        for i in range(4):
+            self.assertEqual(digest(out / f"render/00{i}.png"), digest(self.run_folder / f"render/00{i}.png"))
+        self.succeed("render", self.run_folder, "-o", self.folder / "again", "--background-color", "1,0,0")
+        self.assertNotEqual(digest(self.folder / "again/render/000.png"), digest(out / "render/000.png"))
+
+    def test_eval_measures_depth_against_the_truth(self):
+        out = self.folder / "metrics"
+        table = self.succeed("eval", self.run_folder, "--truth", self.data, "-o", out).stdout
+        self.assertIn("| 003 |", table)
+        metrics = json.loads((out / "metrics.json").read_text())
+        within = metrics["depth"]["share_within_voxels"]
+        self.assertEqual(list(within), ["0.5", "1", "2", "4"])
+        shares = list(within.values())
+        self.assertEqual(shares, sorted(shares))
+        self.assertGreater(within["4"], 0.5)
+        self.assertLess(metrics["depth"]["share_of_empty_given_depth"], 0.2)
+        self.assertEqual(len(metrics["depth"]["views"]), 4)
+        # True depth that is off by two voxels must be seen to be off.
+        self.expect_error(2, "no folder depth", "eval", self.run_folder, "--truth", self.folder)
+
+    def test_merge_of_halves_has_the_voxels_of_both(self):
+        voxel = 3 / 16
+        for name, bounds in (("left", f"-1.5,-1.5,-1.2,0,1.5,1.8"), ("right", f"0,-1.5,-1.2,1.5,1.5,1.8")):
+            out = self.folder / name
+            self.succeed("reconstruct", self.data, "-o", out, "--levels", "1", "--passes", "2", "--voxel-size", voxel,
+                         f"--bounds={bounds}", "--no-depth", "--no-render")
+        merged = self.folder / "merged"
+        self.succeed("merge", self.folder / "left", self.folder / "right", "-o", merged)
+        count = {n: json.loads((self.folder / n / "summary.json").read_text()) for n in ("left", "right", "merged")}
+        halves = [count[n]["levels"][-1]["voxels_in_box"] for n in ("left", "right")]
+        self.assertEqual(count["merged"]["voxels_in_box"], sum(halves))
+        self.assertEqual(len(count["merged"]["merged_from"]), 2)
+        self.succeed("render", merged, "--cameras", self.data, "-o", self.folder / "merged-views")
+
+    def test_merge_refuses_what_does_not_fit(self):
+        rgb, _ = self.reconstruct("rgb", "--color-space", "rgb")
+        self.expect_error(2, "colour space rgb, expected luv", "merge", self.run_folder, rgb, "-o", self.folder / "never")
+        self.assertFalse((self.folder / "never").exists())
+
+    def test_convert_gives_the_same_cameras_in_both_formats(self):
+        runs = []
+        for target in ("transforms", "colmap"):
+            out = self.folder / target
+            self.succeed("convert", self.data, "-o", out, "--to", target)
+            info = json.loads(self.succeed("info", out, "--json").stdout)
+            self.assertEqual((info["format"], info["images"], info["masks"]), (target, 4, 4))
+            runs.append(self.reconstruct("from-" + target, "--bounds", "-1.5,-1.5,-1.2,1.5,1.5,1.8", data=out)[1])
+        original = self.reconstruct("from-data", "--bounds", "-1.5,-1.5,-1.2,1.5,1.5,1.8")[1]
+        for converted in runs:
+            self.assertAlmostEqual(converted["reprojection_rms_percent"], original["reprojection_rms_percent"], delta=0.2)
+
+    def test_info_says_what_the_data_set_holds(self):
+        info = json.loads(self.succeed("info", self.data, "--json", "--resolution", "64").stdout)
+        self.assertEqual((info["format"], info["images"], info["nodes"], info["image_sizes"]), ("transforms", 4, 4, "64 x 48"))
+        self.assertEqual(info["voxels"], [64, 64, 64])
+        self.assertGreater(info["estimate"]["memory_bytes"], 1e6)
+        self.assertTrue(any("pixel" in warning for warning in info["warnings"]))
+
+    def test_synth_depends_on_its_seed_alone(self):
+        worlds = {}
+        for name, seed in (("a", 5), ("b", 5), ("c", 6)):
+            out = self.folder / ("world-" + name)
+            self.succeed("synth", "demo", "-o", out, "--images", "2", "--size", "32x24", "--seed", seed)
+            worlds[name] = {f: digest(out / f) for f in files_below(out)}
+        self.assertEqual(worlds["a"], worlds["b"])
+        self.assertNotEqual(worlds["a"]["images/000.png"], worlds["c"]["images/000.png"])
+
+
+class Interrupt(Case):
+    """Ctrl-C at different moments: code 130 soon, one line, and nothing half-written."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-cli-"))
+        cls.data = cls.folder / "data"
+        cls.synth(cls.data, 8, "160x120")
+
+    PATIENCE_S = 10  # a second or two on an idle machine; builds and sanitizers share it
+
+    def interrupt(self, out, moment, *arguments, number=signal.SIGINT):
+        """Starts a run and signals it when `moment` is said; what it said, and how long it took to end."""
+        job = subprocess.Popen([ROXEL, "reconstruct", str(self.data), "-o", str(out), *arguments],
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        said = ""
+        for line in job.stderr:
+            said += line
+            if moment in line:
+                break
+        self.assertIsNone(job.poll(), said)
+        start = time.monotonic()
+        job.send_signal(number)
+        out_text, rest = job.communicate(timeout=60)
+        self.assertLess(time.monotonic() - start, self.PATIENCE_S)
+        self.assertEqual(job.returncode, 130, said + rest)
+        self.assertEqual((said + rest).splitlines()[-1], "roxel: error: interrupted")
+        self.assertEqual(out_text, "")
+
+    LONG = ["--resolution", "128", "--levels", "2", "--passes", "200", "--all-passes"]
+
+    def test_in_the_passes_leaves_nothing(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            out = self.folder / "fresh/run"
+            self.interrupt(out, "level 1/2 pass 1/", *self.LONG, number=number)
+            self.assertFalse((self.folder / "fresh").exists())
+
+    def test_in_the_passes_leaves_an_older_run_as_it_was(self):
+        out = self.folder / "older"
+        self.succeed("reconstruct", self.data, "-o", out, *TINY)
+        before = {f: digest(out / f) for f in files_below(out)}
+        self.interrupt(out, "level 1/2 pass 1/", *self.LONG)
+        self.assertEqual({f: digest(out / f) for f in files_below(out)}, before)
+
+    def test_after_the_passes_leaves_whole_files_and_no_summary(self):
+        out = self.folder / "late"
+        self.interrupt(out, "writing", "--resolution", "128", "--levels", "1", "--passes", "1")
+        left = files_below(out) if out.exists() else []
+        self.assertNotIn("summary.json", left)
+        self.assertEqual([f for f in left if pathlib.Path(f).name.startswith(".")], [])
+
+
+def main():
+    global ROXEL, SOURCE
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    ROXEL = os.path.abspath(sys.argv.pop(1))
+    SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+    unittest.main(argv=[sys.argv[0], *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()
