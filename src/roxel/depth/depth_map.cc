@@ -75,8 +75,10 @@ class PixelDepthMarch {
 
   PixelDepth at(const SampleView& view, int x, int y) {
     const Region region{0, x, y};
-    const RegionStats sample = view.pyramid->at(0, x, y);
+    RegionStats sample = view.pyramid->at(0, x, y);
     if (sample.valid <= 0) return {};
+    // The depth is that of the ray through the pixel's centre: on the object where most of the pixel is.
+    sample.foreground = sample.foreground >= 0.5f ? 1.0f : 0.0f;
     steps_.clear();
     shares_.clear();
     RemovedColor removed;
