@@ -15,6 +15,21 @@ constexpr float kLargestOpacitySum = 1 << 20;
 
 std::int64_t fixed(double value, double unit) { return std::llrint(value * unit); }
 
+/// Whether no principal minor of the covariance (xx, yy, zz, xy, xz, yz) is negative.
+bool semi_definite(const double s[6]) {
+  const double determinant = s[0] * (s[1] * s[2] - s[5] * s[5]) + s[3] * (s[5] * s[4] - s[3] * s[2]) +
+                             s[4] * (s[3] * s[5] - s[1] * s[4]);
+  return s[0] * s[1] >= s[3] * s[3] && s[0] * s[2] >= s[4] * s[4] && s[1] * s[2] >= s[5] * s[5] && determinant >= 0;
+}
+
+/// Few colours have a covariance of low rank, which rounding makes indefinite by a hair half of the time: raises the
+/// variances by what the difference of moments of size `moment` may have lost, and on until it is enough.
+void make_semi_definite(double moment, double s[6]) {
+  for (double lost = 1e-7 * moment; !semi_definite(s) && lost < moment; lost *= 4)
+    for (int c = 0; c < 3; ++c) s[c] += lost;
+  if (!semi_definite(s)) s[3] = s[4] = s[5] = 0;
+}
+
 template <class Visit>
 void for_each_entered_slot(const LatticeStack& stack, const NodeScratch& node, Visit&& visit) {
   for (const std::uint32_t number : node.entered_bricks()) {
@@ -133,11 +148,7 @@ void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& wei
   s[3] -= m[0] * m[1];
   s[4] -= m[0] * m[2];
   s[5] -= m[1] * m[2];
-  // Rounding must not make the covariance indefinite: where a principal minor is negative, keep the diagonal.
-  const double minor = s[0] * s[1] - s[3] * s[3];
-  const double determinant = s[0] * (s[1] * s[2] - s[5] * s[5]) + s[3] * (s[5] * s[4] - s[3] * s[2]) +
-                             s[4] * (s[3] * s[5] - s[1] * s[4]);
-  if (minor < 0 || determinant < 0) s[3] = s[4] = s[5] = 0;
+  make_semi_definite(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + s[0] + s[1] + s[2], s);
   for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(m[c]);
   for (int c = 0; c < 6; ++c) cov[c] = static_cast<float>(s[c]);
 }

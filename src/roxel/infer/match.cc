@@ -31,9 +31,13 @@ struct GaussianAgreement {
                                                          float d, float e, float f) const {
     const float m00 = b * c - f * f, m01 = e * f - d * c, m02 = d * f - b * e;
     const float m11 = a * c - e * e, m12 = d * e - a * f, m22 = a * b - d * d;
-    const float determinant = a * m00 + d * m01 + e * m02;
-    const float quadratic = m00 * dx * dx + m11 * dy * dy + m22 * dz * dz +
-                            2.0f * (m01 * dx * dy + m02 * dx * dz + m12 * dy * dz);
+    const float minors = a * m00 + d * m01 + e * m02;
+    const float adjugate = m00 * dx * dx + m11 * dy * dy + m22 * dz * dz +
+                           2.0f * (m01 * dx * dy + m02 * dx * dz + m12 * dy * dz);
+    // S exceeds S_min, so its determinant does, too: hold on to that where rounding would not (wide thin spreads).
+    const float least = normaliser * normaliser;
+    const float determinant = minors > least ? minors : least;
+    const float quadratic = adjugate > 0.0f ? adjugate : 0.0f;
     return normaliser / std::sqrt(determinant) * exp_negative(-0.5f * quadratic / determinant);
   }
 };

@@ -135,7 +135,7 @@ class PassTwin {
         if (sample.weight <= 0) return;
         distribute(sample);
         add_sums(sample, looked);
-        log_likelihood_ += sample.weight * std::log(sample.z);
+        log_likelihood_ += sample.weight * std::log(std::max(sample.z, kLeast));
       });
       for (std::size_t v = 0; v < voxels_.size(); ++v) voxels_[v].looked += looked[v];
     }
@@ -186,7 +186,7 @@ class PassTwin {
         if (!inside(view, region.child(c))) continue;
         TwinSample child = evaluate(view, region.child(c), std::max(range.begin, range.end));
         if (child.weight <= 0) continue;
-        log_behind += child.weight * std::log(child.z);
+        log_behind += child.weight * std::log(std::max(child.z, kLeast));
         weight_behind += child.weight;
         best = std::max(best, child.path_sum);
         node.children.push_back(std::move(child));
@@ -209,6 +209,9 @@ class PassTwin {
   }
 
  private:
+  static constexpr double kLeast =
+      1e-30;  ///< likelihood of a sample that meets nothing and has no background
+
   template <class Visit>
   static void for_each_root(const SampleNode& node, Visit&& visit) {
     for (const SampleView& view : node) {
@@ -258,6 +261,7 @@ class PassTwin {
   }
 
   static void distribute_posterior(TwinSample& node, double q) {
+    if (node.z <= 0) return;
     double transmittance = 1, reach = q;
     for (TwinStep& step : node.steps) {
       step.reach = reach;

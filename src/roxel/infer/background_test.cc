@@ -1,0 +1,56 @@
+#include "roxel/infer/background.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace roxel {
+namespace {
+
+RegionStats sample_of(float l, float foreground) { return {{l, 0, 0}, {9, 9, 9, 0, 0, 0}, 1, foreground}; }
+
+Background background_of(BackgroundKind kind) {
+  Background background;
+  background.kind = kind;
+  background.mean[0] = 20;
+  background.cov[0] = 4;
+  background.unknown_likelihood = 0.002f;
+  return background;
+}
+
+/// sqrt(|S_min| / |S|) exp(-d^2 / (2 S)) along the first axis: noise 16, sample 9, background 4.
+double known_agreement(double d) {
+  return std::sqrt(16.0 * 16 * 16 / (29.0 * 25 * 25)) * std::exp(-0.5 * d * d / 29);
+}
+
+TEST(Background, NoneIsNeverSeen) {
+  const Background none = background_of(BackgroundKind::kNone);
+  EXPECT_EQ(background_likelihood(none, {}, sample_of(20, 1)), 0);
+  EXPECT_EQ(known_background_share(none, {}, sample_of(20, 1)), 0);
+}
+
+TEST(Background, UnknownIsAnyColourAlike) {
+  const Background unknown = background_of(BackgroundKind::kUnknown);
+  for (const float l : {0.0f, 20.0f, 90.0f})
+    EXPECT_EQ(background_likelihood(unknown, {}, sample_of(l, 1)), 0.002f);
+  EXPECT_EQ(known_background_share(unknown, {}, sample_of(20, 1)), 0);
+}
+
+TEST(Background, KnownIsAgreementWithItsColour) {
+  const Background known = background_of(BackgroundKind::kKnown);
+  for (const float l : {20.0f, 27.0f, 35.0f}) {
+    EXPECT_NEAR(background_likelihood(known, {}, sample_of(l, 1)), known_agreement(l - 20) + 1e-7, 1e-6);
+    EXPECT_NEAR(known_background_share(known, {}, sample_of(l, 1)), known_agreement(l - 20), 1e-6);
+  }
+}
+
+TEST(Background, MaskIsTheShareCalledBackground) {
+  const Background mask = background_of(BackgroundKind::kMask);
+  for (const float foreground : {0.0f, 0.3f, 1.0f}) {
+    EXPECT_NEAR(background_likelihood(mask, {}, sample_of(20, foreground)), 1 - foreground + 1e-7, 1e-7);
+    EXPECT_NEAR(known_background_share(mask, {}, sample_of(20, foreground)), 1 - foreground, 1e-7);
+  }
+}
+
+}  // namespace
+}  // namespace roxel
