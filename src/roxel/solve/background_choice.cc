@@ -91,17 +91,15 @@ void choose_automatically(const std::vector<std::array<float, 3>>& colors, Scene
 
 }  // namespace
 
-BorderSample sample_border(const Photograph& photo, const Scene& scene) {
+BorderSample sample_border(const Photograph& photo) {
   BorderSample sample;
   sample.has_mask = !photo.foreground.empty();
   const int width = photo.rgb.width(), height = photo.rgb.height();
   const int stride = std::max(1, 2 * (width + height) / 512);
   const auto add = [&](int x, int y) {
     if (!photo.valid.empty() && photo.valid.at(x, y) == 0) return;
-    std::array<float, 3> color;
-    for (int c = 0; c < 3; ++c) color[c] = photo.rgb.pixel(x, y)[c] / static_cast<float>(scene.exposure);
-    scene.transform.from_rgb(color.data(), color.data());
-    sample.colors.push_back(color);
+    const float* rgb = photo.rgb.pixel(x, y);
+    sample.colors.push_back({rgb[0], rgb[1], rgb[2]});
   };
   const int inset = std::min({2, width - 1, height - 1});
   for (int x = 0; x < width; x += stride) add(x, inset), add(x, height - 1 - inset);
@@ -114,7 +112,11 @@ void choose_background(const std::vector<BorderSample>& borders, const Reconstru
   std::vector<std::array<float, 3>> colors;
   for (const BorderSample& border : borders) {
     masked += border.has_mask;
-    colors.insert(colors.end(), border.colors.begin(), border.colors.end());
+    for (std::array<float, 3> color : border.colors) {
+      for (float& c : color) c /= static_cast<float>(scene.exposure);
+      scene.transform.from_rgb(color.data(), color.data());
+      colors.push_back(color);
+    }
   }
   Background& background = scene.background;
   switch (options.background) {

@@ -8,12 +8,12 @@ namespace roxel {
 /// What one image tells: whether it has a mask, and the colours along its border.
 struct BorderSample {
   bool has_mask = false;
-  std::vector<std::array<float, 3>> colors;  ///< matching space, a few hundred
+  std::vector<std::array<float, 3>> colors;  ///< linear RGB as read, a few hundred
 };
 
-BorderSample sample_border(const Photograph& photo, const Scene& scene);
+BorderSample sample_border(const Photograph& photo);
 
-/// Chooses, or obeys options.background; appends to scene.notes why. Throws InvalidInput where masks are asked
+/// Chooses, or obeys options.background, under scene.exposure and scene.transform; appends to scene.notes why. Throws InvalidInput where masks are asked
 /// for and missing.
 void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options, Scene& scene);
 

@@ -126,7 +126,7 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
     context.throw_if_cancelled();
     const Photograph photo = load(dataset.views[v]);
     luminances[v] = sample_luminance(photo);
-    borders[v] = sample_border(photo, scene);
+    borders[v] = sample_border(photo);
   });
   std::vector<float> all;
   for (const auto& part : luminances) all.insert(all.end(), part.begin(), part.end());

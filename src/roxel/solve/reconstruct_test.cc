@@ -1,0 +1,298 @@
+#include "roxel/solve/reconstruct.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <thread>
+
+#include "roxel/base/error.h"
+#include "roxel/solve/cube_fixture.h"
+#include "roxel/solve/run_stages.h"
+
+namespace roxel {
+namespace {
+
+using fixture::cube_dataset;
+using fixture::cube_loader;
+using fixture::CubeWorld;
+
+ReconstructOptions cube_options() {
+  ReconstructOptions options;
+  options.bounds = {-0.8, -0.8, -0.8, 0.8, 0.8, 0.8};
+  options.resolution = 32;
+  options.levels = 2;
+  options.passes = 4;
+  return options;
+}
+
+struct Hits {
+  int surface = 0, near = 0, empty = 0, false_surface = 0;
+};
+
+/// Compares depth maps with the cube: pixels within one voxel along the ray, empty pixels given depth.
+Hits compare(const Dataset& dataset, const PhotographLoader& load, const Reconstruction& reconstruction,
+             const ReconstructOptions& options) {
+  Hits hits;
+  std::mutex mutex;
+  RunContext context(2);
+  ViewStageOptions stages;
+  stages.render = false;
+  for_each_view_result(
+      dataset, load, reconstruction, options, stages, context, [&](const ViewResult& result) {
+        const std::lock_guard lock(mutex);
+        const PinholeCamera& camera = dataset.views[result.view_idx].camera;
+        for (int y = 0; y < camera.intrinsics.height; ++y)
+          for (int x = 0; x < camera.intrinsics.width; ++x) {
+            const std::optional<double> truth = CubeWorld::hit(camera.ray(x + 0.5, y + 0.5));
+            const bool found = *result.depth.opacity.pixel(x, y) > 0.5f;
+            hits.surface += truth.has_value();
+            hits.empty += !truth.has_value();
+            hits.false_surface += !truth && found;
+            hits.near +=
+                truth && found &&
+                std::abs(*result.depth.depth.pixel(x, y) - *truth) <= reconstruction.scene.voxel_size;
+          }
+      });
+  return hits;
+}
+
+TEST(Reconstruct, FindsATexturedCube) {
+  const Dataset dataset = cube_dataset(8, 48);
+  for (const bool masks : {false, true}) {
+    const PhotographLoader load = cube_loader(std::array{0.0f, 0.0f, 0.0f}, masks);
+    RunContext context(2);
+    const Reconstruction result = reconstruct(dataset, load, cube_options(), context);
+    const Hits hits = compare(dataset, load, result, cube_options());
+    EXPECT_GT(hits.surface, 2000);
+    EXPECT_GT(hits.near, 0.85 * hits.surface) << (masks ? "masks" : "black background");
+    EXPECT_LT(hits.false_surface, 0.05 * hits.empty);
+  }
+}
+
+// A scene that goes on behind the box: auto finds no plain border, calls the background unknown and surrounds
+// the box.
+TEST(Reconstruct, ASceneThatGoesOnEndsInTheSurround) {
+  const Dataset dataset = cube_dataset(12, 36);
+  ReconstructOptions options = cube_options();
+  options.passes = 3;
+  const PhotographLoader load = cube_loader(std::nullopt);
+  RunContext context(2);
+  const Reconstruction result = reconstruct(dataset, load, options, context);
+  EXPECT_EQ(result.scene.background.kind, BackgroundKind::kUnknown);
+  EXPECT_GT(result.volume.lattice_count(), 1);
+  const Hits hits = compare(dataset, load, result, options);
+  EXPECT_GT(hits.near, 0.7 * hits.surface);
+  EXPECT_LT(hits.false_surface, 0.5 * hits.empty);  // twelve views 30 degrees apart leave much of it open
+}
+
+TEST(Reconstruct, IsTheSameForAnyNumberOfThreads) {
+  const Dataset dataset = cube_dataset(7, 24);
+  ReconstructOptions options = cube_options();
+  options.resolution = 16;
+  options.background = BackgroundChoice::kUnknown;  // with surround, the most that a run can have
+  options.passes = 2;
+  const auto run = [&](int threads) {
+    RunContext context(threads);
+    return reconstruct(dataset, cube_loader(), options, context);
+  };
+  const Reconstruction one = run(1);
+  for (const int threads : {2, 4}) {
+    const Reconstruction many = run(threads);
+    EXPECT_EQ(many.volume.tau, one.volume.tau);
+    EXPECT_EQ(many.volume.color_mean, one.volume.color_mean);
+    EXPECT_EQ(many.volume.color_cov, one.volume.color_cov);
+    EXPECT_EQ(many.volume.confidence, one.volume.confidence);
+    EXPECT_EQ(many.volume.support, one.volume.support);
+    ASSERT_EQ(many.summary.passes.size(), one.summary.passes.size());
+    EXPECT_EQ(many.summary.passes.back().mean_log_likelihood, one.summary.passes.back().mean_log_likelihood);
+  }
+}
+
+TEST(Reconstruct, HalvesVoxelsFromLevelToLevel) {
+  ReconstructOptions options = cube_options();
+  options.levels = 3;
+  options.passes = 2;
+  options.all_passes = true;
+  int levels_seen = 0, passes_seen = 0;
+  ReconstructHooks hooks;
+  hooks.after_level = [&](const Volume& volume, const Scene&, const Summary& summary) {
+    ++levels_seen;
+    EXPECT_EQ(volume.box_slot_count(), summary.levels.back().voxels_in_box);
+  };
+  hooks.after_pass = [&](const PassRecord&) { ++passes_seen; };
+  RunContext context(2);
+  const Reconstruction result = reconstruct(cube_dataset(6, 32), cube_loader(), options, context, hooks);
+  ASSERT_EQ(result.summary.levels.size(), 3u);
+  EXPECT_EQ(levels_seen, 3);
+  EXPECT_EQ(passes_seen, 6);
+  for (int level = 0; level < 3; ++level)
+    EXPECT_DOUBLE_EQ(result.summary.levels[level].voxel_size, std::ldexp(1.6 / 32, 2 - level));
+  EXPECT_DOUBLE_EQ(result.volume.index(0).frame().voxel_size, 1.6 / 32);
+  ASSERT_EQ(result.summary.passes.size(), 6u);
+  EXPECT_EQ(result.summary.passes[3].level, 2);
+  EXPECT_EQ(result.summary.passes[3].pass, 2);
+  EXPECT_GT(result.summary.passes[3].steps, 0);
+  EXPECT_EQ(result.summary.termination, "pass limit");
+  EXPECT_FALSE(result.summary.brief().empty());
+}
+
+TEST(Reconstruct, StopsALevelThatHasComeToRest) {
+  ReconstructOptions options = cube_options();
+  options.levels = 1;
+  options.passes = 50;
+  options.tolerance = 0.02;
+  RunContext context(2);
+  const Reconstruction result = reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
+  EXPECT_LT(result.summary.passes.size(), 50u);
+  EXPECT_TRUE(result.summary.levels.back().converged);
+  EXPECT_EQ(result.summary.termination, "converged");
+  EXPECT_LT(result.summary.passes.back().mean_opacity_change, 0.02);
+  for (std::size_t i = 0; i + 1 < result.summary.passes.size(); ++i)
+    EXPECT_GE(result.summary.passes[i].mean_opacity_change, 0.02);
+}
+
+TEST(Reconstruct, ReportsProgressFromZeroToItsShare) {
+  std::vector<Progress> reports;
+  RunContext context(2, [&](const Progress& progress) { reports.push_back(progress); });
+  ReconstructOptions options = cube_options();
+  options.all_passes = true;
+  reconstruct(cube_dataset(6, 32), cube_loader(), options, context, {}, 0.8);
+  ASSERT_GT(reports.size(), 16u);  // more than one a pass
+  EXPECT_LT(reports.front().fraction, 0.05);
+  EXPECT_NEAR(reports.back().fraction, 0.8, 1e-9);
+  for (std::size_t i = 1; i < reports.size(); ++i) {
+    EXPECT_GE(reports[i].fraction, reports[i - 1].fraction);
+    EXPECT_GE(reports[i].level, reports[i - 1].level);
+  }
+  EXPECT_EQ(reports.back().level, 2);
+  EXPECT_EQ(reports.back().pass, options.passes);
+}
+
+TEST(Reconstruct, StopsPromptlyWhenCancelledFromAnotherThread) {
+  using Clock = std::chrono::steady_clock;
+  std::atomic<bool> running{false};
+  RunContext context(2, [&](const Progress&) { running = true; });
+  ReconstructOptions options = cube_options();
+  options.passes = 1000;
+  options.all_passes = true;
+  Clock::time_point cancelled_at;
+  std::thread user([&] {
+    while (!running) std::this_thread::yield();
+    cancelled_at = Clock::now();
+    context.cancel();
+  });
+  EXPECT_THROW(reconstruct(cube_dataset(8, 48), cube_loader(), options, context), Cancelled);
+  const double seconds = std::chrono::duration<double>(Clock::now() - cancelled_at).count();
+  user.join();
+  EXPECT_LT(seconds, 2);
+}
+
+TEST(Reconstruct, ACancelledContextDoesNothing) {
+  RunContext context(1);
+  context.cancel();
+  EXPECT_THROW(reconstruct(cube_dataset(6, 32), cube_loader(), cube_options(), context), Cancelled);
+}
+
+TEST(Reconstruct, FailuresOfTheLoaderReachTheCaller) {
+  RunContext context(2);
+  const PhotographLoader broken = [](const View& view) -> Photograph {
+    throw_invalid(view.name, "0 bytes", "an image");
+  };
+  EXPECT_THROW(reconstruct(cube_dataset(6, 32), broken, cube_options(), context), InvalidInput);
+}
+
+TEST(Reconstruct, OptionsOutOfRangeAreRefused) {
+  ReconstructOptions options = cube_options();
+  options.spatial_prior = 1.5;
+  RunContext context(1);
+  EXPECT_THROW(reconstruct(cube_dataset(6, 32), cube_loader(), options, context), InvalidInput);
+}
+
+TEST(Reconstruct, MoreSamplesPerVoxelAreMoreSteps) {
+  const auto steps = [](double samples_per_voxel) {
+    ReconstructOptions options = cube_options();
+    options.samples_per_voxel = samples_per_voxel;
+    options.resolution = 8;  // voxels of 3 to 5 pixels
+    options.levels = 1;
+    options.passes = 1;
+    RunContext context(2);
+    return reconstruct(cube_dataset(6, 32), cube_loader(), options, context).summary.passes.back().steps;
+  };
+  EXPECT_GT(steps(1), 2 * steps(0.25));
+  EXPECT_GT(steps(2), 1.2 * steps(1));  // no sample is finer than a pixel
+}
+
+// --init: the next run starts where the last one ended.
+TEST(Reconstruct, StartsFromAnInitialVolume) {
+  const Dataset dataset = cube_dataset(6, 32);
+  ReconstructOptions options = cube_options();
+  options.levels = 1;
+  options.passes = 6;
+  options.all_passes = true;
+  RunContext context(2);
+  const Reconstruction first = reconstruct(dataset, cube_loader(), options, context);
+  options.passes = 1;
+  ReconstructHooks hooks;
+  hooks.initial = &first.volume;
+  const Reconstruction cold = reconstruct(dataset, cube_loader(), options, context);
+  const Reconstruction warm = reconstruct(dataset, cube_loader(), options, context, hooks);
+  const double reached = first.summary.passes.back().mean_log_likelihood;
+  EXPECT_GT(warm.summary.passes[0].mean_log_likelihood, cold.summary.passes[0].mean_log_likelihood + 0.5);
+  EXPECT_GT(warm.summary.passes[0].mean_log_likelihood, reached - 0.1);
+}
+
+/// A volume of one brick at the origin with voxels of size s, each channel distinct.
+Volume brick_of(double s, const Eigen::Vector3i& bricks) {
+  Topology topology(LatticeFrame{{0, 0, 0}, s, bricks});
+  for (int z = 0; z < 8 * bricks.z(); ++z)
+    for (int y = 0; y < 8 * bricks.y(); ++y)
+      for (int x = 0; x < 8 * bricks.x(); ++x)
+        if ((x + y + z) % 5 != 0) topology.insert({x, y, z});
+  Volume volume({topology});
+  for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot) {
+    volume.tau[slot] = 0.01f * (slot + 1);
+    volume.confidence[slot] = 0.5f;
+    volume.color_weight[slot] = 2 + slot;
+    volume.color_mean[slot] = {1.0f * slot, 2, 3};
+    volume.color_cov[slot] = {4, 5, 6, 1.0f * slot, 0, 1};
+  }
+  return volume;
+}
+
+TEST(InitialiseFrom, TakesEachVoxelFromWhereItsCentreIs) {
+  const Volume source = brick_of(1, {1, 1, 1});
+  for (const double size : {0.5, 1.0, 2.0}) {  // finer, equal, coarser
+    Topology topology(LatticeFrame{{0, 0, 0}, size, Eigen::Vector3i::Constant(2)});
+    for (int z = 0; z < 16; ++z)
+      for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 16; ++x) topology.insert({x, y, z});
+    Volume volume({topology});
+    std::fill(volume.tau.begin(), volume.tau.end(), 0.125f);
+    initialise_from(source, volume);
+    int taken = 0;
+    for (int z = 0; z < 16; ++z)
+      for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 16; ++x) {
+          const std::uint32_t slot = volume.index(0).slot({x, y, z});
+          const Eigen::Vector3d at = volume.index(0).frame().voxel_centre({x, y, z});
+          const std::uint32_t from = source.index(0).slot(at.array().floor().cast<int>().matrix());
+          if (from == kNoSlot) {
+            EXPECT_EQ(volume.tau[slot], 0.125f);
+            EXPECT_EQ(volume.color_weight[slot], 0);
+            continue;
+          }
+          ++taken;
+          EXPECT_NEAR(volume.tau[slot], source.tau[from] * size, 1e-6);  // tau is per voxel length
+          EXPECT_EQ(volume.color_mean[slot], source.color_mean[from]);
+          EXPECT_EQ(volume.color_cov[slot], source.color_cov[from]);
+          EXPECT_EQ(volume.color_weight[slot], source.color_weight[from]);
+          EXPECT_EQ(volume.confidence[slot], source.confidence[from]);
+        }
+    EXPECT_GT(taken, 20);
+  }
+}
+
+}  // namespace
+}  // namespace roxel

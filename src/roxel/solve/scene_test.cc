@@ -1,0 +1,192 @@
+#include "roxel/solve/scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "roxel/base/error.h"
+#include "roxel/solve/cube_fixture.h"
+
+namespace roxel {
+namespace {
+
+using fixture::cube_dataset;
+using fixture::cube_loader;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+ReconstructOptions cube_options() {
+  ReconstructOptions options;
+  options.bounds = {-0.8, -0.8, -0.8, 0.8, 0.8, 0.8};
+  options.resolution = 32;
+  options.levels = 2;
+  return options;
+}
+
+Scene surveyed(const ReconstructOptions& options, const PhotographLoader& load) {
+  return survey(cube_dataset(6, 24), load, options, RunContext(2));
+}
+
+TEST(Survey, TakesTheGivenBoxAndItsVoxelSize) {
+  const Scene scene = surveyed(cube_options(), cube_loader());
+  EXPECT_EQ(scene.bounds.box.max(), Eigen::Vector3d::Constant(0.8));
+  EXPECT_DOUBLE_EQ(scene.voxel_size, 1.6 / 32);
+  ReconstructOptions options = cube_options();
+  options.voxel_size = 0.03;
+  EXPECT_DOUBLE_EQ(surveyed(options, cube_loader()).voxel_size, 0.03);
+}
+
+TEST(Survey, RefusesAbsurdVoxelSizes) {
+  ReconstructOptions options = cube_options();
+  options.voxel_size = 1e-6;
+  EXPECT_THROW(surveyed(options, cube_loader()), InvalidInput);
+}
+
+TEST(Survey, ChoosesTheBackgroundFromTheImages) {
+  EXPECT_EQ(surveyed(cube_options(), cube_loader()).background.kind, BackgroundKind::kKnown);
+  EXPECT_EQ(surveyed(cube_options(), cube_loader(std::array{0.0f, 0.0f, 0.0f}, true)).background.kind,
+            BackgroundKind::kMask);
+}
+
+TEST(Survey, DisplayWhiteIsTheExposureOfOrdinaryImages) {
+  EXPECT_EQ(surveyed(cube_options(), cube_loader()).exposure, 1);
+}
+
+// Radiance 50 times above white: the exposure brings the median to middle grey, and colours with it.
+TEST(Survey, HighDynamicRangeGetsAnExposure) {
+  const Scene one = surveyed(cube_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 50));
+  EXPECT_GT(one.exposure, 10);
+  EXPECT_THAT(one.notes, Contains(HasSubstr("exposure")));
+  const Scene ten = surveyed(cube_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 500));
+  EXPECT_NEAR(ten.exposure / one.exposure, 10, 1e-4);
+}
+
+TEST(Survey, ABackgroundOfHighDynamicRangeIsMeasuredUnderTheExposure) {
+  const Scene scene = surveyed(cube_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 50));
+  ASSERT_EQ(scene.background.kind, BackgroundKind::kKnown);
+  const float grey = static_cast<float>(0.3 * 50 / scene.exposure);
+  float expected[3] = {grey, grey, grey};
+  scene.transform.from_rgb(expected, expected);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(scene.background.mean[c], expected[c], 0.1);
+}
+
+TEST(Survey, WhitePointAndSpaceAreThoseAskedFor) {
+  ReconstructOptions options = cube_options();
+  options.white_point = "A";
+  const Scene warm = surveyed(options, cube_loader());
+  const Scene plain = surveyed(cube_options(), cube_loader());
+  const float grey[3] = {0.5f, 0.5f, 0.5f};
+  float under_a[3], under_d65[3];
+  warm.transform.from_rgb(grey, under_a);
+  plain.transform.from_rgb(grey, under_d65);
+  EXPECT_NEAR(under_d65[1], 0, 0.1);  // daylight grey has no colour under D65, and is bluish under A:
+  const double expected_u = 13 * under_a[0] * (kWhiteD65.u_prime() - kWhiteA.u_prime());
+  EXPECT_NEAR(under_a[1], expected_u, 0.2);
+  EXPECT_LT(under_a[1], -20);
+  options.color_space = ColorSpace::kRgb;
+  EXPECT_EQ(surveyed(options, cube_loader()).transform.space(), ColorSpace::kRgb);
+  options.white_point = "blue";
+  EXPECT_THROW(surveyed(options, cube_loader()), InvalidInput);
+}
+
+TEST(Survey, ModelFollowsTheOptions) {
+  ReconstructOptions options = cube_options();
+  options.noise = 6;
+  options.outlier = 1e-5;
+  options.evidence_half = 0.4;
+  const Scene scene = surveyed(options, cube_loader());
+  for (const float variance : scene.model.noise_variance) EXPECT_FLOAT_EQ(variance, 36);
+  EXPECT_FLOAT_EQ(scene.model.outlier, 1e-5f);
+  EXPECT_FLOAT_EQ(scene.model.evidence_half, 0.4f);
+  // p_0 is the unknown background's density, (2 pi)^{3/2} 6^3 over the gamut's volume.
+  const double p_0 = std::pow(2 * M_PI, 1.5) * 216 / gamut_volume(ColorSpace::kLuv);
+  EXPECT_NEAR(scene.model.uninformative, p_0, 1e-3 * p_0);
+  EXPECT_FLOAT_EQ(scene.background.unknown_likelihood, scene.model.uninformative);
+  options.predictive = false;
+  EXPECT_EQ(surveyed(options, cube_loader()).model.evidence_half, 0);
+}
+
+TEST(Survey, SurroundReachesAsFarAsRaysDo) {
+  ReconstructOptions options = cube_options();
+  options.far = 40;
+  for (const SurroundChoice choice : {SurroundChoice::kOn, SurroundChoice::kAuto}) {
+    options.surround = choice;
+    options.background = BackgroundChoice::kUnknown;
+    const Scene scene = surveyed(options, cube_loader());
+    ASSERT_GT(scene.surround_count, 0);
+    const std::vector<LatticeFrame> frames = frames_of_first_level(scene, options);
+    ASSERT_EQ(static_cast<int>(frames.size()), scene.surround_count + 1);
+    const Dataset dataset = cube_dataset(6, 24);
+    for (const View& view : dataset.views)
+      for (const double u : {0.5, 12.0, 23.5})
+        for (const double v : {0.5, 12.0, 23.5}) {
+          const Ray ray = view.camera.ray(u, v);
+          EXPECT_TRUE(frames.back().box().contains(ray.origin + 40 * ray.direction));
+        }
+    // At most one lattice more than it takes (the innermost is padded to whole bricks).
+    EXPECT_LT(0.5 * frames.back().box().sizes().maxCoeff(), 4 * 43);
+  }
+}
+
+TEST(Survey, SurroundIsForBackgroundsThatAreNotKnown) {
+  ReconstructOptions options = cube_options();
+  EXPECT_EQ(surveyed(options, cube_loader()).surround_count, 0);  // auto, black background found
+  options.surround = SurroundChoice::kOn;
+  EXPECT_GT(surveyed(options, cube_loader()).surround_count, 0);
+  options.surround = SurroundChoice::kOff;
+  options.background = BackgroundChoice::kUnknown;
+  EXPECT_EQ(surveyed(options, cube_loader()).surround_count, 0);
+}
+
+TEST(ViewRange, EndsBehindTheBoxWithoutSurround) {
+  const Dataset dataset = cube_dataset(6, 24);
+  const Scene scene = surveyed(cube_options(), cube_loader());
+  const Stretch range = view_range(scene, dataset, 0);
+  double farthest = 0, nearest = 1e9;
+  for (int corner = 0; corner < 8; ++corner) {
+    const double z =
+        dataset.views[0]
+            .camera
+            .camera_from_world(scene.bounds.box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)))
+            .z();
+    farthest = std::max(farthest, z);
+    nearest = std::min(nearest, z);
+  }
+  EXPECT_GE(range.end, farthest);
+  EXPECT_LE(range.end, 1.05 * farthest);
+  EXPECT_LE(range.begin, nearest);
+  EXPECT_GT(range.begin, 0);
+}
+
+TEST(MakeSamples, FollowTheLoaderNodesAndWeights) {
+  const Dataset dataset = cube_dataset(6, 24);
+  ReconstructOptions options = cube_options();
+  const Scene scene = survey(dataset, cube_loader(), options, RunContext(1));
+  const std::vector<SampleNode> nodes =
+      make_samples(dataset, cube_loader(), scene, 0.1, options, RunContext(2));
+  ASSERT_EQ(nodes.size(), dataset.nodes.size());
+  const SampleView& view = nodes[dataset.views[2].node_idx].front();
+  EXPECT_EQ(view.camera.pose.centre, dataset.views[2].camera.pose.centre);
+  // A voxel of 0.1 at distance 3 covers (36 * 0.1 / 3)^2 pixels, which together make one observation.
+  const double footprint = 36 * 0.1 / 3;
+  EXPECT_NEAR(view.pixel_weight, options.observation_weight / (footprint * footprint), 1e-6);
+  // The middle region shows the cube, in the matching space.
+  const int level = view.plan.finest_level, middle = view.pyramid->width(level) / 2;
+  EXPECT_GT(view.pyramid->at(level, middle, middle).mean[0], 20);
+  options.observation_weight *= 3;
+  EXPECT_NEAR(make_samples(dataset, cube_loader(), scene, 0.1, options, RunContext(1))[0][0].pixel_weight,
+              3 * view.pixel_weight, 1e-6);
+}
+
+TEST(MakeSamples, SmallVoxelsNeverWeighPixelsMoreThanOnce) {
+  const Dataset dataset = cube_dataset(6, 24);
+  const ReconstructOptions options = cube_options();
+  const Scene scene = survey(dataset, cube_loader(), options, RunContext(1));
+  const std::vector<SampleNode> nodes =
+      make_samples(dataset, cube_loader(), scene, 0.01, options, RunContext(1));
+  EXPECT_FLOAT_EQ(nodes[0][0].pixel_weight, static_cast<float>(options.observation_weight));
+}
+
+}  // namespace
+}  // namespace roxel
