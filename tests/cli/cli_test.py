@@ -441,11 +441,12 @@ class OtherCommands(Case):
             self.assertAlmostEqual(converted["reprojection_rms_percent"], original["reprojection_rms_percent"], delta=0.2)
 
     def test_info_says_what_the_data_set_holds(self):
-        info = json.loads(self.succeed("info", self.data, "--json", "--resolution", "64").stdout)
+        info = json.loads(self.succeed("info", self.data, "--json", "--resolution", "256").stdout)
         self.assertEqual((info["format"], info["images"], info["nodes"], info["image_sizes"]), ("transforms", 4, 4, "64 x 48"))
-        self.assertEqual(info["voxels"], [64, 64, 64])
+        self.assertEqual(info["voxels"], [256, 256, 256])
         self.assertGreater(info["estimate"]["memory_bytes"], 1e6)
-        self.assertTrue(any("pixel" in warning for warning in info["warnings"]))
+        fine = json.loads(self.succeed("info", self.data, "--json", "--resolution", "512").stdout)
+        self.assertTrue(any("pixel" in warning for warning in fine["warnings"]), fine["warnings"])
 
     def test_synth_depends_on_its_seed_alone(self):
         worlds = {}

@@ -105,7 +105,8 @@ TEST(Bounds, PanoramasLookOutwards) {
   EXPECT_EQ(rig.layout, CameraLayout::kInsideOut);
   EXPECT_NEAR(rig.extent, std::hypot(20, 1), 1e-9) << "from the lowest node to the highest";
   const SceneBounds bounds = default_bounds(dataset);
-  EXPECT_TRUE(bounds.box.contains(Eigen::AlignedBox3d(Eigen::Vector3d(-12, -10, 0), Eigen::Vector3d(12, 14, 6))))
+  EXPECT_TRUE(
+      bounds.box.contains(Eigen::AlignedBox3d(Eigen::Vector3d(-12, -10, 0), Eigen::Vector3d(12, 14, 6))))
       << bounds.box.min().transpose() << " .. " << bounds.box.max().transpose();
   EXPECT_TRUE(cube(45).contains(bounds.box));
   for (const DepthRange& range : bounds.views) {

@@ -52,7 +52,8 @@ std::pair<std::size_t, std::size_t> main_mode(const std::vector<Share>& shares, 
   return {begin, end};
 }
 
-PixelDepth summarise(const std::vector<Share>& shares, float total, float voxel_variance, DepthEstimate estimate) {
+PixelDepth summarise(const std::vector<Share>& shares, float total, float voxel_variance,
+                     DepthEstimate estimate) {
   if (total < DepthMap::kLeastOpacity || shares.empty()) return {0, 0, total};
   PixelDepth all = moments(shares, 0, shares.size());
   const std::size_t middle = median_share(shares, total);
@@ -69,8 +70,11 @@ PixelDepth summarise(const std::vector<Share>& shares, float total, float voxel_
 /// Evaluates single pixels against the colours that a prepared scratch holds.
 class PixelDepthMarch {
  public:
-  PixelDepthMarch(const LatticeStack& stack, const PassOptions& pass, const DepthOptions& options, NodeScratch& scratch)
-      : pass_(pass), options_(options), box_slots_(stack.volume().box_slot_count()),
+  PixelDepthMarch(const LatticeStack& stack, const PassOptions& pass, const DepthOptions& options,
+                  NodeScratch& scratch)
+      : pass_(pass),
+        options_(options),
+        box_slots_(stack.volume().box_slot_count()),
         march_(stack, scratch, pass.opacity.model, pass.opacity.background, pass.opacity.filters) {}
 
   PixelDepth at(const SampleView& view, int x, int y) {
@@ -111,9 +115,10 @@ class PixelDepthMarch {
 
 }  // namespace
 
-std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& samples, const SampleNode& views,
-                                     const PassOptions& pass, const Totals& totals, const DepthOptions& options,
-                                     const RunContext& context, NodeScratch& scratch) {
+std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& samples,
+                                     const SampleNode& views, const PassOptions& pass, const Totals& totals,
+                                     const DepthOptions& options, const RunContext& context,
+                                     NodeScratch& scratch) {
   if (pass.predictive)
     march_color(stack, samples, pass.opacity.model, pass.opacity.background, false, context, scratch);
   scratch.compare_with(totals.color);

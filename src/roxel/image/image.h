@@ -13,7 +13,9 @@ class Image {
  public:
   Image() = default;
   Image(int width, int height, int channels, float value = 0.0f)
-      : width_(width), height_(height), channels_(channels),
+      : width_(width),
+        height_(height),
+        channels_(channels),
         data_(static_cast<std::size_t>(width) * height * channels, value) {}
 
   int width() const { return width_; }
@@ -26,9 +28,7 @@ class Image {
   const std::vector<float>& data() const { return data_; }
 
  private:
-  std::size_t index(int x, int y) const {
-    return (static_cast<std::size_t>(y) * width_ + x) * channels_;
-  }
+  std::size_t index(int x, int y) const { return (static_cast<std::size_t>(y) * width_ + x) * channels_; }
   int width_ = 0;
   int height_ = 0;
   int channels_ = 0;

@@ -14,17 +14,23 @@ float known_agreement(const Background& background, const MatchModel& model, con
 
 }  // namespace
 
-float background_likelihood(const Background& background, const MatchModel& model, const RegionStats& sample) {
+float background_likelihood(const Background& background, const MatchModel& model,
+                            const RegionStats& sample) {
   switch (background.kind) {
-    case BackgroundKind::kNone: return 0;
-    case BackgroundKind::kUnknown: return background.unknown_likelihood;
-    case BackgroundKind::kKnown: return known_agreement(background, model, sample) + model.outlier;
-    case BackgroundKind::kMask: return (1 - sample.foreground) + model.outlier;
+    case BackgroundKind::kNone:
+      return 0;
+    case BackgroundKind::kUnknown:
+      return background.unknown_likelihood;
+    case BackgroundKind::kKnown:
+      return known_agreement(background, model, sample) + model.outlier;
+    case BackgroundKind::kMask:
+      return (1 - sample.foreground) + model.outlier;
   }
   return 0;
 }
 
-float known_background_share(const Background& background, const MatchModel& model, const RegionStats& sample) {
+float known_background_share(const Background& background, const MatchModel& model,
+                             const RegionStats& sample) {
   if (background.kind == BackgroundKind::kKnown) return known_agreement(background, model, sample);
   if (background.kind == BackgroundKind::kMask) return 1 - sample.foreground;
   return 0;

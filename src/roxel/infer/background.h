@@ -6,15 +6,15 @@
 namespace roxel {
 
 enum class BackgroundKind {
-  kNone,      ///< every ray ends in the volume: likelihood 0
-  kUnknown,   ///< any colour of the gamut alike: a constant likelihood
-  kKnown,     ///< one colour with a spread (black, or a constant one): agreement as for voxels
-  kMask,      ///< the share of the sample that the mask calls background
+  kNone,     ///< every ray ends in the volume: likelihood 0
+  kUnknown,  ///< any colour of the gamut alike: a constant likelihood
+  kKnown,    ///< one colour with a spread (black, or a constant one): agreement as for voxels
+  kMask,     ///< the share of the sample that the mask calls background
 };
 
 struct Background {
   BackgroundKind kind = BackgroundKind::kUnknown;
-  float mean[3] = {0, 0, 0};        ///< kKnown: matching space
+  float mean[3] = {0, 0, 0};  ///< kKnown: matching space
   float cov[6] = {0, 0, 0, 0, 0, 0};
   float unknown_likelihood = 0.001f;  ///< kUnknown: (2 pi)^{3/2} |S_min|^{1/2} / gamut volume
 };
@@ -23,6 +23,7 @@ struct Background {
 float background_likelihood(const Background& background, const MatchModel& model, const RegionStats& sample);
 
 /// How surely the sample shows a *known* background, 0 to 1: such samples do not colour voxels.
-float known_background_share(const Background& background, const MatchModel& model, const RegionStats& sample);
+float known_background_share(const Background& background, const MatchModel& model,
+                             const RegionStats& sample);
 
 }  // namespace roxel

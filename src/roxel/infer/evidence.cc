@@ -19,11 +19,13 @@ std::int64_t fixed(double value, double unit) { return std::llrint(value * unit)
 bool semi_definite(const double s[6]) {
   const double determinant = s[0] * (s[1] * s[2] - s[5] * s[5]) + s[3] * (s[5] * s[4] - s[3] * s[2]) +
                              s[4] * (s[3] * s[5] - s[1] * s[4]);
-  return s[0] * s[1] >= s[3] * s[3] && s[0] * s[2] >= s[4] * s[4] && s[1] * s[2] >= s[5] * s[5] && determinant >= 0;
+  return s[0] * s[1] >= s[3] * s[3] && s[0] * s[2] >= s[4] * s[4] && s[1] * s[2] >= s[5] * s[5] &&
+         determinant >= 0;
 }
 
-/// Few colours have a covariance of low rank, which rounding makes indefinite by a hair half of the time: raises the
-/// variances by what the difference of moments of size `moment` may have lost, and on until it is enough.
+/// Few colours have a covariance of low rank, which rounding makes indefinite by a hair half of the time:
+/// raises the variances by what the difference of moments of size `moment` may have lost, and on until it is
+/// enough.
 void make_semi_definite(double moment, double s[6]) {
   for (double lost = 1e-7 * moment; !semi_definite(s) && lost < moment; lost *= 4)
     for (int c = 0; c < 3; ++c) s[c] += lost;
@@ -41,7 +43,9 @@ void for_each_entered_slot(const LatticeStack& stack, const NodeScratch& node, V
 }  // namespace
 
 NodeScratch::NodeScratch(const LatticeStack& stack, const std::vector<float>& tau)
-    : stack_(&stack), tau_(tau.data()), voxels_(new VoxelScratch[stack.volume().slot_count()]),
+    : stack_(&stack),
+      tau_(tau.data()),
+      voxels_(new VoxelScratch[stack.volume().slot_count()]),
       entered_(stack.brick_count(), 0) {}
 
 void NodeScratch::set_up_brick(std::uint32_t number) {
@@ -83,7 +87,8 @@ ColorTotals capped_color(const VoxelScratch& voxel) {
   const double scale = std::min(1.0, weight) / weight;
   const auto bounded = [](double value, double limit) { return std::clamp(value, -limit, limit); };
   totals[0] = fixed(weight * scale, kColorUnit);
-  for (int c = 0; c < 3; ++c) totals[1 + c] = fixed(bounded(voxel.mean[c] * scale, kLargestColor), kColorUnit);
+  for (int c = 0; c < 3; ++c)
+    totals[1 + c] = fixed(bounded(voxel.mean[c] * scale, kLargestColor), kColorUnit);
   for (int c = 0; c < 6; ++c)
     totals[4 + c] = fixed(bounded(voxel.cov[c] * scale, kLargestColor * kLargestColor), kColorUnit);
   return totals;

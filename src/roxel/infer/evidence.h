@@ -1,11 +1,11 @@
 #pragma once
-/// Exact sums of what all nodes say about each voxel. A node's own sums are collected by one worker in a fixed
-/// order (NodeScratch, floats); the totals over nodes are integers (fixed point), so that nodes may arrive in
-/// any order, from any thread or rank, and the totals are the same bit for bit.
+/// Exact sums of what all nodes say about each voxel. A node's own sums are collected by one worker in a
+/// fixed order (NodeScratch, floats); the totals over nodes are integers (fixed point), so that nodes may
+/// arrive in any order, from any thread or rank, and the totals are the same bit for bit.
 ///
 /// Bounds: a node adds at most weight 1 of colours with components below 2^10 (clamped) to a voxel, so colour
-/// sums stay below nodes * 2^20 * 2^24 (second moments) and cannot overflow for fewer than 2^19 nodes. Opacity
-/// sums are saturated at 2^20 a node and voxel (2^40 in fixed point).
+/// sums stay below nodes * 2^20 * 2^24 (second moments) and cannot overflow for fewer than 2^19 nodes.
+/// Opacity sums are saturated at 2^20 a node and voxel (2^40 in fixed point).
 
 #include <array>
 #include <atomic>
@@ -51,8 +51,8 @@ class NodeScratch {
   void enter(std::uint32_t brick) {
     if (!entered_[brick]) set_up_brick(brick);
   }
-  /// Turns all entered voxels from the node's own colour sums into what the *other* nodes say (the totals less
-  /// the node's own, capped); bricks entered from now on get the totals, and opacity sums start at 0.
+  /// Turns all entered voxels from the node's own colour sums into what the *other* nodes say (the totals
+  /// less the node's own, capped); bricks entered from now on get the totals, and opacity sums start at 0.
   void compare_with(const std::vector<ColorTotals>& totals);
   const std::vector<std::uint32_t>& entered_bricks() const { return order_; }
   /// Forgets the node.
@@ -69,7 +69,8 @@ class NodeScratch {
   std::vector<std::uint32_t> order_;
 };
 
-/// The node's colour sums of one voxel in fixed point, its weight capped at 1 (docs/passes.md, predictive agreement).
+/// The node's colour sums of one voxel in fixed point, its weight capped at 1 (docs/passes.md, predictive
+/// agreement).
 ColorTotals capped_color(const VoxelScratch& voxel);
 
 /// Adds a node's sums to the totals; safe from several threads at once.

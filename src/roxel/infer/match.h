@@ -1,6 +1,7 @@
 #pragma once
 /// How well what a ray sees agrees with what voxels look like, for a block of voxels at once: the innermost
-/// loop of every pass. Formulas: equations in docs/color.md and docs/passes.md; [Jethwa04] eq. (4.1), (4.2), (4.5).
+/// loop of every pass. Formulas: equations in docs/color.md and docs/passes.md; [Jethwa04] eq. (4.1), (4.2),
+/// (4.5).
 
 #include <bit>
 #include <cstdint>
@@ -37,20 +38,21 @@ SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model);
 /// Structure of arrays for up to kSize voxels along a ray: the inputs are gathered, the outputs computed.
 struct alignas(64) MatchBlock {
   static constexpr int kSize = 64;
-  float diff[3][kSize];        ///< in: voxel mean minus sample mean
-  float cov[6][kSize];         ///< in: voxel covariance
-  float evidence[kSize];       ///< in: weight w of the voxel's colour evidence
-  float tau[kSize];            ///< in: optical depth of one voxel length
-  float length[kSize];         ///< in: chord in voxel lengths
-  float opacity[kSize];        ///< out: a = 1 - exp(-tau length)
-  float mean_path[kSize];      ///< out: e = 1/tau - length (1 - a)/a, the mean distance of an ending inside
-  float likelihood[kSize];     ///< out: p
+  float diff[3][kSize];     ///< in: voxel mean minus sample mean
+  float cov[6][kSize];      ///< in: voxel covariance
+  float evidence[kSize];    ///< in: weight w of the voxel's colour evidence
+  float tau[kSize];         ///< in: optical depth of one voxel length
+  float length[kSize];      ///< in: chord in voxel lengths
+  float opacity[kSize];     ///< out: a = 1 - exp(-tau length)
+  float mean_path[kSize];   ///< out: e = 1/tau - length (1 - a)/a, the mean distance of an ending inside
+  float likelihood[kSize];  ///< out: p
 };
 
 /// Fills the outputs of the first `count` entries.
 void evaluate_match(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block);
 
-/// Agreement of two Gaussians in (0, 1] (or the baseline's value), one pair at a time; the slow twin of the block.
+/// Agreement of two Gaussians in (0, 1] (or the baseline's value), one pair at a time; the slow twin of the
+/// block.
 float agreement(const MatchModel& model, const float mean_difference[3], const float cov_sum_plus_noise[6]);
 
 namespace internal {

@@ -28,8 +28,8 @@ void for_each_root(const SampleNode& node, const RunContext& context, Visit&& vi
 
 class ColorMarch {
  public:
-  ColorMarch(const LatticeStack& stack, const MatchModel& model, const Background& background, bool everywhere,
-             NodeScratch& scratch)
+  ColorMarch(const LatticeStack& stack, const MatchModel& model, const Background& background,
+             bool everywhere, NodeScratch& scratch)
       : stack_(stack), model_(model), background_(background), everywhere_(everywhere), scratch_(scratch) {}
 
   void march(const SampleView& view, const Region& region, double begin, float transmittance) {
@@ -52,22 +52,23 @@ class ColorMarch {
 
   float deposit(const SampleView& view, const Region& region, const RegionStats& sample, Stretch range,
                 float transmittance) {
-    const float weight = observation_weight(view, region, sample) * sample.foreground *
-                         (1 - (background_.kind == BackgroundKind::kKnown
-                                   ? known_background_share(background_, model_, sample)
-                                   : 0.0f));
+    const float weight =
+        observation_weight(view, region, sample) * sample.foreground *
+        (1 - (background_.kind == BackgroundKind::kKnown ? known_background_share(background_, model_, sample)
+                                                         : 0.0f));
     float second[6];
     for (int c = 0; c < 3; ++c) second[c] = sample.cov[c] + sample.mean[c] * sample.mean[c];
     second[3] = sample.cov[3] + sample.mean[0] * sample.mean[1];
     second[4] = sample.cov[4] + sample.mean[0] * sample.mean[2];
     second[5] = sample.cov[5] + sample.mean[1] * sample.mean[2];
     ++counts.rays;
-    stack_.walk_chunks(region_ray(view, region), range, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
-                       [&](const StepChunk& chunk) {
-                         counts.steps += chunk.count;
-                         transmittance = add_to_voxels(chunk, sample.mean, second, weight, transmittance);
-                         return everywhere_ || transmittance > kOpaque;
-                       });
+    stack_.walk_chunks(
+        region_ray(view, region), range, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
+        [&](const StepChunk& chunk) {
+          counts.steps += chunk.count;
+          transmittance = add_to_voxels(chunk, sample.mean, second, weight, transmittance);
+          return everywhere_ || transmittance > kOpaque;
+        });
     return transmittance;
   }
 
@@ -99,17 +100,18 @@ class ColorMarch {
   StepChunk chunk_;
 };
 
-/// One sample of the tree that a root sample divides into: its own stretch of steps and what its children add.
+/// One sample of the tree that a root sample divides into: its own stretch of steps and what its children
+/// add.
 struct TreeNode {
   Region region;
   std::uint32_t first_step = 0;
   std::uint32_t end_step = 0;
   Segment own;
-  float weight = 0;            ///< observation weight
-  float background = 0;        ///< p_bg, for leaves
-  float behind = 0;            ///< leaves: p_bg; inner: product of Z_c^{share}
-  float z = 0;                 ///< own.Z + own.T * behind
-  float agreement_sum = 0;     ///< roxels: of this stretch; and with the best leaf path behind it
+  float weight = 0;         ///< observation weight
+  float background = 0;     ///< p_bg, for leaves
+  float behind = 0;         ///< leaves: p_bg; inner: product of Z_c^{share}
+  float z = 0;              ///< own.Z + own.T * behind
+  float agreement_sum = 0;  ///< roxels: of this stretch; and with the best leaf path behind it
   float best_path_sum = 0;
   int children[4] = {-1, -1, -1, -1};
 };
@@ -117,7 +119,8 @@ struct TreeNode {
 class OpacityMarch {
  public:
   OpacityMarch(const LatticeStack& stack, const OpacityPassOptions& options, NodeScratch& scratch)
-      : options_(options), scratch_(scratch),
+      : options_(options),
+        scratch_(scratch),
         march_(stack, scratch, options.model, options.background, options.filters) {
     march_.set_early_stop(options.rule == UpdateRule::kPosterior);
   }
@@ -140,7 +143,8 @@ class OpacityMarch {
   PassCounts counts;
 
  private:
-  /// Marches the region and, depth first, its children; returns its index in tree_, or -1 without valid pixels.
+  /// Marches the region and, depth first, its children; returns its index in tree_, or -1 without valid
+  /// pixels.
   int build(const SampleView& view, const Region& region, double begin, RemovedColor removed) {
     const RegionStats sample = view.pyramid->at(region.level, region.x, region.y);
     if (sample.valid <= 0) return -1;
@@ -157,7 +161,8 @@ class OpacityMarch {
     }
     node.end_step = static_cast<std::uint32_t>(steps_.size());
     counts.steps += node.end_step - node.first_step;
-    for (std::uint32_t s = node.first_step; s < node.end_step; ++s) node.agreement_sum += steps_[s].likelihood;
+    for (std::uint32_t s = node.first_step; s < node.end_step; ++s)
+      node.agreement_sum += steps_[s].likelihood;
 
     const bool ends = range.end >= view.plan.range.end || region.level == view.plan.finest_level;
     const bool spent = options_.rule == UpdateRule::kPosterior &&
@@ -190,7 +195,8 @@ class OpacityMarch {
     if (total > 0) node.behind = std::exp(log_sum / total);
   }
 
-  /// Gives out probability `reach` (of the ray getting as far as this sample's stretch) to its voxels and children.
+  /// Gives out probability `reach` (of the ray getting as far as this sample's stretch) to its voxels and
+  /// children.
   void distribute_posterior(int index, float reach) {
     const TreeNode& node = tree_[index];
     if (node.z <= 0) return;
@@ -212,7 +218,8 @@ class OpacityMarch {
       if (child >= 0 && onward > 1e-6f) distribute_posterior(child, onward);
   }
 
-  /// [Jethwa04] section 2.3.2 steps 3 and 4, normalised by the largest sum over the leaf paths (section 5.1.1).
+  /// [Jethwa04] section 2.3.2 steps 3 and 4, normalised by the largest sum over the leaf paths
+  /// (section 5.1.1).
   void distribute_roxels(int index, float path_sum, float explained) {
     const TreeNode& node = tree_[index];
     for (std::uint32_t s = node.first_step; s < node.end_step; ++s) {

@@ -13,10 +13,10 @@ enum class UpdateRule {
 
 /// Sums over rays that a pass reports; counts and sums of sums, all exact or folded in a fixed order.
 struct PassCounts {
-  std::int64_t rays = 0;           ///< samples marched
-  std::int64_t steps = 0;          ///< existing voxels crossed with positive weight
-  double log_likelihood = 0;       ///< sum over root samples of weight * log Z (posterior rule)
-  double observation_weight = 0;   ///< sum of the root samples' weights
+  std::int64_t rays = 0;          ///< samples marched
+  std::int64_t steps = 0;         ///< existing voxels crossed with positive weight
+  double log_likelihood = 0;      ///< sum over root samples of weight * log Z (posterior rule)
+  double observation_weight = 0;  ///< sum of the root samples' weights
 
   PassCounts& operator+=(const PassCounts& other);
 };
@@ -36,8 +36,8 @@ struct OpacityPassOptions {
   bool ray_weights = false;  ///< weigh opacity sums by the ray weight, too
 };
 
-/// Opacity: adds each sample's responsibilities to hits, exposure and looked of the voxels that its ray meets.
-/// The scratch holds the colours to compare with (NodeScratch::compare_with).
+/// Opacity: adds each sample's responsibilities to hits, exposure and looked of the voxels that its ray
+/// meets. The scratch holds the colours to compare with (NodeScratch::compare_with).
 PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const OpacityPassOptions& options,
                          const RunContext& context, NodeScratch& scratch);
 

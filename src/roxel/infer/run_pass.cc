@@ -48,7 +48,8 @@ class ScratchPool {
 std::vector<int> by_size(const std::vector<SampleNode>& nodes) {
   std::vector<int> order(nodes.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return nodes[a].size() > nodes[b].size(); });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return nodes[a].size() > nodes[b].size(); });
   return order;
 }
 
@@ -60,7 +61,8 @@ PassCounts sum(const std::vector<PassCounts>& per_node) {
 
 template <class Work>
 std::vector<PassCounts> for_each_node(const std::vector<SampleNode>& nodes, const RunContext& context,
-                                      const PassProgress& progress, double from, double to, const Work& work) {
+                                      const PassProgress& progress, double from, double to,
+                                      const Work& work) {
   const std::vector<int> order = by_size(nodes);
   std::vector<PassCounts> counts(nodes.size());
   std::atomic<int> done{0};
@@ -85,8 +87,9 @@ double log_prior(const Volume& volume, const std::vector<float>& prior_opacity, 
 
 }  // namespace
 
-PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode>& nodes, const PassOptions& options,
-                         const RunContext& context, const PassProgress& progress, Totals& totals) {
+PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode>& nodes,
+                         const PassOptions& options, const RunContext& context, const PassProgress& progress,
+                         Totals& totals) {
   totals.clear_color();
   ScratchPool pool(stack, stack.volume().tau, context.thread_count());
   return sum(for_each_node(nodes, context, progress, 0, 0.3, [&](const SampleNode& node, int worker) {
@@ -98,8 +101,8 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
   }));
 }
 
-PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options, const RunContext& context,
-                    const PassProgress& progress, Volume& volume) {
+PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,
+                    const RunContext& context, const PassProgress& progress, Volume& volume) {
   PassReport report;
   const LatticeStack stack(volume);
   Totals totals(volume.slot_count());
@@ -111,25 +114,27 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   start = Clock::now();
   ScratchPool pool(stack, volume.tau, context.thread_count());
   std::vector<double> march_seconds(context.thread_count(), 0.0);
-  report.opacity = sum(for_each_node(nodes, context, progress, 0.3, 1, [&](const SampleNode& node, int worker) {
-    NodeScratch& scratch = pool.of(worker);
-    // The node's own colours once more, to leave them out of what its rays are compared with.
-    if (options.predictive)
-      march_color(stack, node, options.opacity.model, options.opacity.background, options.everywhere, context, scratch);
-    scratch.compare_with(totals.color);
-    const double march_start = thread_seconds();
-    const PassCounts counts = march_opacity(stack, node, options.opacity, context, scratch);
-    march_seconds[worker] += thread_seconds() - march_start;
-    totals.add_opacity(stack, scratch);
-    return counts;
-  }));
+  report.opacity =
+      sum(for_each_node(nodes, context, progress, 0.3, 1, [&](const SampleNode& node, int worker) {
+        NodeScratch& scratch = pool.of(worker);
+        // The node's own colours once more, to leave them out of what its rays are compared with.
+        if (options.predictive)
+          march_color(stack, node, options.opacity.model, options.opacity.background, options.everywhere,
+                      context, scratch);
+        scratch.compare_with(totals.color);
+        const double march_start = thread_seconds();
+        const PassCounts counts = march_opacity(stack, node, options.opacity, context, scratch);
+        march_seconds[worker] += thread_seconds() - march_start;
+        totals.add_opacity(stack, scratch);
+        return counts;
+      }));
   report.opacity_seconds = seconds_since(start);
   for (const double seconds : march_seconds) report.opacity_march_cpu_seconds += seconds;
 
   const std::vector<float> field = prior_opacity_field(volume, options.prior, context.thread_count());
   report.prior_log_likelihood = log_prior(volume, field, options.prior.strength);
-  report.update = update_opacity(options.opacity.rule, totals, field, options.prior.strength, context.thread_count(),
-                                 volume);
+  report.update = update_opacity(options.opacity.rule, totals, field, options.prior.strength,
+                                 context.thread_count(), volume);
   update_color(totals, context.thread_count(), volume);
   return report;
 }

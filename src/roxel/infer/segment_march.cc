@@ -20,13 +20,15 @@ RegionStats RemovedColor::apply(const RegionStats& sample) const {
   return rest;
 }
 
-RegionStats SegmentMarch::background_removed(const SampleView& view, const Ray& ray, const RegionStats& sample) {
+RegionStats SegmentMarch::background_removed(const SampleView& view, const Ray& ray,
+                                             const RegionStats& sample) {
   float transmittance = 1;
-  stack_.walk(ray, view.plan.range, [&](std::uint32_t brick) { scratch_.enter(brick); },
-              [&](const VoxelStep& step, const VoxelPlace&) {
-                transmittance *= 1 - one_minus_exp(scratch_[step.slot].tau * step.length);
-                return true;
-              });
+  stack_.walk(
+      ray, view.plan.range, [&](std::uint32_t brick) { scratch_.enter(brick); },
+      [&](const VoxelStep& step, const VoxelPlace&) {
+        transmittance *= 1 - one_minus_exp(scratch_[step.slot].tau * step.length);
+        return true;
+      });
   RemovedColor removed;
   removed.remove(transmittance, background_.mean, background_.cov, filters_.limit);
   return removed.apply(sample);
@@ -101,8 +103,14 @@ bool SegmentMarch::flush(const SampleView& view, const Region& region, const Reg
     }
     const float a = block_.opacity[i], p = block_.likelihood[i];
     in_brick_.append(a, p);
-    *step = {chunk.slot[i], block_.length[i], chunk.weight[i], chunk.depth[i],
-             0.5f * chunk.length[i] * chunk.depth_per_length, a, p, block_.mean_path[i]};
+    *step = {chunk.slot[i],
+             block_.length[i],
+             chunk.weight[i],
+             chunk.depth[i],
+             0.5f * chunk.length[i] * chunk.depth_per_length,
+             a,
+             p,
+             block_.mean_path[i]};
     if (filters_.rays) {
       const VoxelScratch& voxel = scratch_[chunk.slot[i]];
       removed.remove(a, voxel.mean, voxel.cov, filters_.limit);

@@ -43,8 +43,8 @@ struct RemovedColor {
 
 class SegmentMarch {
  public:
-  SegmentMarch(const LatticeStack& stack, NodeScratch& scratch, const MatchModel& model, const Background& background,
-               const SampleFilters& filters)
+  SegmentMarch(const LatticeStack& stack, NodeScratch& scratch, const MatchModel& model,
+               const Background& background, const SampleFilters& filters)
       : stack_(stack), scratch_(scratch), model_(model), background_(background), filters_(filters) {}
 
   /// Marches `ray` over `range`, appends the steps, and returns (T, Z) from the range's begin, folded from

@@ -84,13 +84,15 @@ class Toucher {
         return true;
       };
       const auto all = [](int) { return true; };
-      return walk_cells(frames_[lattice], ray, stretch, enter, all, [&](int packed, std::int64_t, std::int64_t) {
-        const int voxel = internal::packed_voxel(packed);
-        std::atomic<std::uint64_t>& word = brick->words[voxel / 64];
-        const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);
-        if (!(word.load(std::memory_order_relaxed) & bit)) word.fetch_or(bit, std::memory_order_relaxed);
-        return true;
-      });
+      return walk_cells(frames_[lattice], ray, stretch, enter, all,
+                        [&](int packed, std::int64_t, std::int64_t) {
+                          const int voxel = internal::packed_voxel(packed);
+                          std::atomic<std::uint64_t>& word = brick->words[voxel / 64];
+                          const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);
+                          if (!(word.load(std::memory_order_relaxed) & bit))
+                            word.fetch_or(bit, std::memory_order_relaxed);
+                          return true;
+                        });
     });
   }
 
@@ -101,8 +103,8 @@ class Toucher {
 
 }  // namespace
 
-std::vector<Topology> reached_voxels(const std::vector<LatticeFrame>& frames, const std::vector<SampleNode>& nodes,
-                                     const RunContext& context) {
+std::vector<Topology> reached_voxels(const std::vector<LatticeFrame>& frames,
+                                     const std::vector<SampleNode>& nodes, const RunContext& context) {
   std::vector<Eigen::AlignedBox3d> boxes;
   std::vector<std::unique_ptr<ReachedBricks>> reached;
   for (const LatticeFrame& frame : frames) {
@@ -118,7 +120,8 @@ std::vector<Topology> reached_voxels(const std::vector<LatticeFrame>& frames, co
     const int level = view.plan.root_level;
     for (int y = 0; y < view.pyramid->height(level); ++y) {
       context.throw_if_cancelled();
-      for (int x = 0; x < view.pyramid->width(level); ++x) toucher.touch(view, {level, x, y}, view.plan.range.begin);
+      for (int x = 0; x < view.pyramid->width(level); ++x)
+        toucher.touch(view, {level, x, y}, view.plan.range.begin);
     }
   });
   std::vector<Topology> topologies;

@@ -8,7 +8,7 @@ namespace roxel {
 
 /// The topologies of the frames with every cell that a sample with usable object pixels crosses. Samples that
 /// masks call background create nothing. Result independent of the number of threads.
-std::vector<Topology> reached_voxels(const std::vector<LatticeFrame>& frames, const std::vector<SampleNode>& nodes,
-                                     const RunContext& context);
+std::vector<Topology> reached_voxels(const std::vector<LatticeFrame>& frames,
+                                     const std::vector<SampleNode>& nodes, const RunContext& context);
 
 }  // namespace roxel

@@ -8,13 +8,13 @@ namespace roxel {
 
 /// Gamma prior on optical depth with its mode at a field that knows that surfaces are sheets.
 struct PriorOptions {
-  double opacity = 0.02;       ///< alpha_0, in (0, 1)
-  double strength = 5;         ///< beta >= 0, in observations
+  double opacity = 0.02;         ///< alpha_0, in (0, 1)
+  double strength = 5;           ///< beta >= 0, in observations
   double spatial_lambda = 0.95;  ///< lambda in [0, 1]: weight of the neighbours' opacity in the prior's mode
 };
 
-/// The prior's mode of every voxel, as opacity: (1 - lambda) alpha_0 + lambda * the largest mean opacity of the
-/// voxel's 8 neighbours in one of the three axis planes; absent neighbours count 0.
+/// The prior's mode of every voxel, as opacity: (1 - lambda) alpha_0 + lambda * the largest mean opacity of
+/// the voxel's 8 neighbours in one of the three axis planes; absent neighbours count 0.
 std::vector<float> prior_opacity_field(const Volume& volume, const PriorOptions& prior, int threads);
 
 struct UpdateReport {
@@ -23,7 +23,8 @@ struct UpdateReport {
 };
 
 /// Sets tau, confidence and support from the totals.
-/// Posterior: tau <- (hits + beta tau_0) / (exposure + beta). Roxels: alpha <- exposure / hits, alpha_0 without hits.
+/// Posterior: tau <- (hits + beta tau_0) / (exposure + beta). Roxels: alpha <- exposure / hits, alpha_0
+/// without hits.
 UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::vector<float>& prior_opacity,
                             double prior_strength, int threads, Volume& volume);
 

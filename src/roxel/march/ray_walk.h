@@ -2,7 +2,8 @@
 /// Traversal of the nested lattices along one ray. The walk yields the existing voxels in ray order and skips
 /// empty bricks; what happens in a voxel is the visitor's business, which may also say stop.
 ///
-/// Depths are in units of the ray's direction: distance along the optical axis for rays of PinholeCamera::ray.
+/// Depths are in units of the ray's direction: distance along the optical axis for rays of
+/// PinholeCamera::ray.
 
 #include <algorithm>
 #include <array>
@@ -19,7 +20,8 @@ namespace roxel {
 struct VoxelStep {
   std::uint32_t slot;
   float length;  ///< chord, in voxel lengths of the voxel's lattice
-  float weight;  ///< ray weight: 1 through the voxel's centre, 0 at distance sqrt(3)/2 (a vertex), linear between
+  float weight;  ///< ray weight: 1 through the voxel's centre, 0 at distance sqrt(3)/2 (a vertex), linear
+                 ///< between
   float depth;   ///< of the chord's middle
 };
 
@@ -69,7 +71,8 @@ inline int packed_voxel(int p) { return (p & 7) | (p >> 1 & 0x38) | (p >> 2 & 0x
 }  // namespace internal
 
 /// Positions along a ray inside walk_cells are integers: 2^-24 voxel lengths from the ray's origin. Integer
-/// compares and adds make the walk's chain of dependent steps short, and do not depend on where a walk begins.
+/// compares and adds make the walk's chain of dependent steps short, and do not depend on where a walk
+/// begins.
 inline constexpr double kWalkUnit = 1.0 / (1 << 24);
 
 /// Amanatides-Woo over the cells of one frame within `range`, which must lie inside the frame's box.
@@ -77,8 +80,9 @@ inline constexpr double kWalkUnit = 1.0 / (1 << 24);
 /// which cells of it, by voxel_in_brick; `visit(packed cell, in, out)` gets those with their positions (in
 /// kWalkUnit) and returns false to stop. Returns false when stopped.
 template <class Enter, class Wanted, class Visit>
-inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame, const Ray& ray, Stretch range, Enter&& enter, Wanted&& wanted,
-                Visit&& visit) {
+inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame, const Ray& ray,
+                                                      Stretch range, Enter&& enter, Wanted&& wanted,
+                                                      Visit&& visit) {
   const double inverse_size = 1 / frame.voxel_size;
   const double infinity = std::numeric_limits<double>::infinity();
   double origin[3], direction[3], inverse[3], delta[3];
@@ -97,7 +101,9 @@ inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame,
   const double fixed_scale = ray.direction.norm() * inverse_size / kWalkUnit;
   constexpr double kFarthest = 1e18;
   constexpr std::int64_t kNever = static_cast<std::int64_t>(kFarthest);
-  const auto fixed = [&](double at) { return static_cast<std::int64_t>(std::min(at * fixed_scale, kFarthest)); };
+  const auto fixed = [&](double at) {
+    return static_cast<std::int64_t>(std::min(at * fixed_scale, kFarthest));
+  };
   const std::int64_t delta_x = fixed(delta[0]), delta_y = fixed(delta[1]), delta_z = fixed(delta[2]);
   const std::int64_t step_x = step[0], step_y = step[1] * 16, step_z = step[2] * 256;
   double t = range.begin;
@@ -188,20 +194,21 @@ void walk_lattices(const std::vector<Eigen::AlignedBox3d>& boxes, const Ray& ray
   }
 }
 
-/// A run of steps along one ray within one lattice, as arrays: what the inner loops gather and vectorise over.
+/// A run of steps along one ray within one lattice, as arrays: what the inner loops gather and vectorise
+/// over.
 struct alignas(64) StepChunk {
   static constexpr int kSize = 64;
 
   int count = 0;
   int lattice = 0;
   std::uint32_t slot[kSize];
-  float length[kSize];        ///< chord, in voxel lengths of the lattice
-  float depth[kSize];         ///< of the chord's middle
-  float weight[kSize];        ///< ray weight
-  bool brick_start[kSize];    ///< first step in its brick: where segments break (docs/rays.md)
+  float length[kSize];      ///< chord, in voxel lengths of the lattice
+  float depth[kSize];       ///< of the chord's middle
+  float weight[kSize];      ///< ray weight
+  bool brick_start[kSize];  ///< first step in its brick: where segments break (docs/rays.md)
   const Brick* brick[kSize];
-  int packed[kSize];          ///< the voxel in its brick, see internal::pack_cell
-  float depth_per_length;     ///< extent in depth of a chord of one voxel length
+  int packed[kSize];       ///< the voxel in its brick, see internal::pack_cell
+  float depth_per_length;  ///< extent in depth of a chord of one voxel length
 
   Eigen::Vector3d voxel_centre(const LatticeFrame& frame, int i) const {
     return frame.voxel_centre(kBrickSide * brick[i]->coord + Eigen::Vector3i(internal::packed_i(packed[i]),
@@ -249,14 +256,15 @@ class LatticeStack {
     return volume_->index(lattice).bricks()[number - first_brick_[lattice]];
   }
 
-  /// Yields the existing voxels within `range` in chunks. `on_brick(number)` is called before the first voxel of
-  /// each existing brick; `on_chunk(chunk)` gets at most `chunk_size` steps and returns false to stop.
+  /// Yields the existing voxels within `range` in chunks. `on_brick(number)` is called before the first voxel
+  /// of each existing brick; `on_chunk(chunk)` gets at most `chunk_size` steps and returns false to stop.
   template <class OnBrick, class OnChunk>
   void walk_chunks(const Ray& ray, Stretch range, StepChunk& chunk, OnBrick&& on_brick, OnChunk&& on_chunk,
                    int chunk_size = StepChunk::kSize) const {
     const double norm = ray.direction.norm();
     const Eigen::Vector3d unit = ray.direction / norm;
-    const float unit_f[3] = {static_cast<float>(unit.x()), static_cast<float>(unit.y()), static_cast<float>(unit.z())};
+    const float unit_f[3] = {static_cast<float>(unit.x()), static_cast<float>(unit.y()),
+                             static_cast<float>(unit.z())};
     const auto hand_over = [&](int count) __attribute__((noinline)) {
       chunk.count = count;
       chunk.set_weights(unit_f);
@@ -279,7 +287,8 @@ class LatticeStack {
       chunk.lattice = lattice;
       chunk.depth_per_length = static_cast<float>(1 / length_scale);
       const auto enter = [&](int bx, int by, int bz) {
-        const std::int32_t found = table[bx + static_cast<std::size_t>(nx) * (by + static_cast<std::size_t>(ny) * bz)];
+        const std::int32_t found =
+            table[bx + static_cast<std::size_t>(nx) * (by + static_cast<std::size_t>(ny) * bz)];
         if (found < 0) return false;
         brick = bricks + found;
         local = brick->local.data();

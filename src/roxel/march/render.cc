@@ -40,7 +40,8 @@ SeenAlongRay look(const LatticeStack& stack, const std::vector<std::array<float,
 }  // namespace
 
 Rendering render(const LatticeStack& stack, const std::vector<std::array<float, 3>>& colors,
-                 const PinholeCamera& camera, Stretch range, const RenderOptions& options, const RunContext& context) {
+                 const PinholeCamera& camera, Stretch range, const RenderOptions& options,
+                 const RunContext& context) {
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;
   Rendering out{Image(width, height, 3), Image(width, height, 1), Image(width, height, 1)};
   parallel_for(height, context.thread_count(), [&](std::int64_t row, int) {

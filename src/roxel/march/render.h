@@ -21,8 +21,10 @@ struct Rendering {
   Image opacity;  ///< 1 - r_bg, over the box's voxels alone
 };
 
-/// One ray through each pixel's centre, between the depths of `range`; `colors` is linear RGB, one entry a slot.
+/// One ray through each pixel's centre, between the depths of `range`; `colors` is linear RGB, one entry a
+/// slot.
 Rendering render(const LatticeStack& stack, const std::vector<std::array<float, 3>>& colors,
-                 const PinholeCamera& camera, Stretch range, const RenderOptions& options, const RunContext& context);
+                 const PinholeCamera& camera, Stretch range, const RenderOptions& options,
+                 const RunContext& context);
 
 }  // namespace roxel

@@ -37,7 +37,8 @@ SamplePlan make_sample_plan(const PinholeCamera& camera, const Eigen::AlignedBox
     return std::clamp(static_cast<int>(std::floor(std::log2(std::max(side, 1e-9)))), 0, 30);
   };
   plan.finest_level = std::min(level_at(farthest), options.max_root_level);
-  plan.root_level = options.adaptive ? std::min(level_at(nearest), options.max_root_level) : plan.finest_level;
+  plan.root_level =
+      options.adaptive ? std::min(level_at(nearest), options.max_root_level) : plan.finest_level;
   plan.root_level = std::max(plan.root_level, plan.finest_level);
   plan.serves_until_.resize(plan.root_level + 1);
   for (int level = 0; level <= plan.root_level; ++level)

@@ -3,8 +3,8 @@
 ///
 /// A sample is a square region of 2^level pixels a side, as in SamplePyramid. A sample whose region has
 /// diagonal l pixels serves depths up to z = s f / (l m), for voxel size s, focal length f and m samples a
-/// voxel; past it, it divides into its four children. No sample is finer than a pixel or than L = f s / (D m),
-/// D the far distance: finer samples add nothing.
+/// voxel; past it, it divides into its four children. No sample is finer than a pixel or than L = f s / (D
+/// m), D the far distance: finer samples add nothing.
 
 #include <limits>
 #include <vector>
@@ -31,7 +31,8 @@ struct SamplePlan {
   std::vector<double> serves_until_;
 };
 
-/// The plan of one view for voxels of `voxel_size` inside `box`. `range` is cut to what can hold voxels by the caller.
+/// The plan of one view for voxels of `voxel_size` inside `box`. `range` is cut to what can hold voxels by
+/// the caller.
 SamplePlan make_sample_plan(const PinholeCamera& camera, const Eigen::AlignedBox3d& box, double voxel_size,
                             Stretch range, const SamplePlanOptions& options);
 

@@ -24,15 +24,16 @@ std::array<float, 3> median_color(std::vector<std::array<float, 3>> colors) {
   std::array<float, 3> median{};
   for (int c = 0; c < 3; ++c) {
     const auto middle = colors.begin() + colors.size() / 2;
-    std::nth_element(colors.begin(), middle, colors.end(), [c](const auto& a, const auto& b) { return a[c] < b[c]; });
+    std::nth_element(colors.begin(), middle, colors.end(),
+                     [c](const auto& a, const auto& b) { return a[c] < b[c]; });
     median[c] = (*middle)[c];
   }
   return median;
 }
 
 /// Sets mean and covariance of a known background from the colours near `centre`; returns their share.
-double fit_constant(const std::vector<std::array<float, 3>>& colors, const std::array<float, 3>& centre, double radius,
-                    Background& background) {
+double fit_constant(const std::vector<std::array<float, 3>>& colors, const std::array<float, 3>& centre,
+                    double radius, Background& background) {
   double mean[3] = {0, 0, 0}, second[6] = {0, 0, 0, 0, 0, 0};
   std::size_t near = 0;
   for (const auto& color : colors) {
@@ -65,7 +66,8 @@ void set_known(const std::array<float, 3>& color, Background& background) {
 }
 
 std::array<float, 3> in_matching_space(const std::array<double, 3>& rgb, const Scene& scene) {
-  std::array<float, 3> color{static_cast<float>(rgb[0]), static_cast<float>(rgb[1]), static_cast<float>(rgb[2])};
+  std::array<float, 3> color{static_cast<float>(rgb[0]), static_cast<float>(rgb[1]),
+                             static_cast<float>(rgb[2])};
   scene.transform.from_rgb(color.data(), color.data());
   return color;
 }
@@ -107,7 +109,8 @@ BorderSample sample_border(const Photograph& photo) {
   return sample;
 }
 
-void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options, Scene& scene) {
+void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options,
+                       Scene& scene) {
   std::size_t masked = 0;
   std::vector<std::array<float, 3>> colors;
   for (const BorderSample& border : borders) {
@@ -120,22 +123,30 @@ void choose_background(const std::vector<BorderSample>& borders, const Reconstru
   }
   Background& background = scene.background;
   switch (options.background) {
-    case BackgroundChoice::kNone: background.kind = BackgroundKind::kNone; return;
-    case BackgroundChoice::kUnknown: background.kind = BackgroundKind::kUnknown; return;
-    case BackgroundChoice::kBlack: return set_known(in_matching_space({0, 0, 0}, scene), background);
+    case BackgroundChoice::kNone:
+      background.kind = BackgroundKind::kNone;
+      return;
+    case BackgroundChoice::kUnknown:
+      background.kind = BackgroundKind::kUnknown;
+      return;
+    case BackgroundChoice::kBlack:
+      return set_known(in_matching_space({0, 0, 0}, scene), background);
     case BackgroundChoice::kConstant:
       background.kind = BackgroundKind::kKnown;
-      if (options.background_color) return set_known(in_matching_space(*options.background_color, scene), background);
+      if (options.background_color)
+        return set_known(in_matching_space(*options.background_color, scene), background);
       if (colors.empty()) throw_invalid("--background constant", "no image border", "images with pixels");
       fit_constant(colors, median_color(colors), 1e9, background);
       return;
     case BackgroundChoice::kMask:
       if (masked < borders.size())
-        throw_invalid("--background mask", std::to_string(masked) + " masks for " + std::to_string(borders.size()) + " images",
+        throw_invalid("--background mask",
+                      std::to_string(masked) + " masks for " + std::to_string(borders.size()) + " images",
                       "a mask for every image");
       background.kind = BackgroundKind::kMask;
       return;
-    case BackgroundChoice::kAuto: break;
+    case BackgroundChoice::kAuto:
+      break;
   }
   if (!borders.empty() && masked == borders.size()) {
     background.kind = BackgroundKind::kMask;

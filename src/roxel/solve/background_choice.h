@@ -13,8 +13,9 @@ struct BorderSample {
 
 BorderSample sample_border(const Photograph& photo);
 
-/// Chooses, or obeys options.background, under scene.exposure and scene.transform; appends to scene.notes why. Throws InvalidInput where masks are asked
-/// for and missing.
-void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options, Scene& scene);
+/// Chooses, or obeys options.background, under scene.exposure and scene.transform; appends to scene.notes
+/// why. Throws InvalidInput where masks are asked for and missing.
+void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options,
+                       Scene& scene);
 
 }  // namespace roxel

@@ -12,10 +12,16 @@ void add_volume(OptionTable<Options>& table) {
       .help("Box to reconstruct: x0,y0,z0,x1,y1,z1")
       .unit("world units")
       .unset("from the data set, its points, masks, or cameras");
-  table.add("near", &Options::near).help("Nearest depth that is looked for").unit("world units").above(0).unset(
-      "from the cameras and points");
-  table.add("far", &Options::far).help("Depth at which rays end").unit("world units").above(0).unset(
-      "from the cameras and points");
+  table.add("near", &Options::near)
+      .help("Nearest depth that is looked for")
+      .unit("world units")
+      .above(0)
+      .unset("from the cameras and points");
+  table.add("far", &Options::far)
+      .help("Depth at which rays end")
+      .unit("world units")
+      .above(0)
+      .unset("from the cameras and points");
   table.add("voxel-size", &Options::voxel_size)
       .help("Edge of the finest voxels; overrides --resolution")
       .unit("world units")
@@ -28,15 +34,21 @@ void add_volume(OptionTable<Options>& table) {
       .help("Levels of resolution, each with half the voxel size of the one before")
       .range(1, 16)
       .source("[Jethwa04] section 5.2.2");
-  table.add("passes", &Options::passes).help("Most passes a level").range(1, 10000).source("measured on plane and head");
+  table.add("passes", &Options::passes)
+      .help("Most passes a level")
+      .range(1, 10000)
+      .source("measured on plane and head");
   table.add("tolerance", &Options::tolerance)
       .help("Mean change of opacity in a pass that ends a level")
       .range(0, 1);
   table.add("all-passes", &Options::all_passes).help("Do all passes of every level, whatever the tolerance");
-  table.add("surround", &Options::surround,
-            {{"auto", SurroundChoice::kAuto}, {"on", SurroundChoice::kOn}, {"off", SurroundChoice::kOff}})
-      .help("Ever coarser voxels around the box, out to the far distance, so that every ray has a place to end; "
-            "auto: where the background is not known");
+  table
+      .add("surround", &Options::surround,
+           {{"auto", SurroundChoice::kAuto}, {"on", SurroundChoice::kOn}, {"off", SurroundChoice::kOff}})
+      .help(
+          "Ever coarser voxels around the box, out to the far distance, so that every ray has a place to "
+          "end; "
+          "auto: where the background is not known");
 }
 
 void add_sampling(OptionTable<Options>& table) {
@@ -58,8 +70,12 @@ void add_sampling(OptionTable<Options>& table) {
 
 void add_color(OptionTable<Options>& table) {
   table.group("Colour");
-  table.add("color-space", &Options::color_space,
-            {{"luv", ColorSpace::kLuv}, {"rgb", ColorSpace::kRgb}, {"srgb", ColorSpace::kSrgb}, {"hsv", ColorSpace::kHsv}})
+  table
+      .add("color-space", &Options::color_space,
+           {{"luv", ColorSpace::kLuv},
+            {"rgb", ColorSpace::kRgb},
+            {"srgb", ColorSpace::kSrgb},
+            {"hsv", ColorSpace::kHsv}})
       .help("Space that colours are compared in")
       .source("[Jethwa04] section 4.3");
   table.add("white-point", &Options::white_point)
@@ -70,8 +86,11 @@ void add_color(OptionTable<Options>& table) {
       .unit("units of the colour space")
       .above(0)
       .unset("4 in Luv, the same share of the gamut elsewhere");
-  table.add("agreement", &Options::agreement,
-            {{"gaussian", Agreement::kGaussian}, {"exponential", Agreement::kExponential}, {"linear", Agreement::kLinear}})
+  table
+      .add("agreement", &Options::agreement,
+           {{"gaussian", Agreement::kGaussian},
+            {"exponential", Agreement::kExponential},
+            {"linear", Agreement::kLinear}})
       .help("How two colours are matched")
       .source("[Jethwa04] eq. (4.5), (4.2), (4.1)");
   table.add("agreement-scale", &Options::agreement_scale)
@@ -93,13 +112,14 @@ void add_color(OptionTable<Options>& table) {
 
 void add_background(OptionTable<Options>& table) {
   table.group("Background");
-  table.add("background", &Options::background,
-            {{"auto", BackgroundChoice::kAuto},
-             {"none", BackgroundChoice::kNone},
-             {"unknown", BackgroundChoice::kUnknown},
-             {"black", BackgroundChoice::kBlack},
-             {"constant", BackgroundChoice::kConstant},
-             {"mask", BackgroundChoice::kMask}})
+  table
+      .add("background", &Options::background,
+           {{"auto", BackgroundChoice::kAuto},
+            {"none", BackgroundChoice::kNone},
+            {"unknown", BackgroundChoice::kUnknown},
+            {"black", BackgroundChoice::kBlack},
+            {"constant", BackgroundChoice::kConstant},
+            {"mask", BackgroundChoice::kMask}})
       .help("What a ray sees that passes every voxel");
   table.add("background-color", &Options::background_color)
       .help("Colour of a constant background: linear r,g,b")
@@ -114,14 +134,22 @@ void add_background(OptionTable<Options>& table) {
 
 void add_opacity(OptionTable<Options>& table) {
   table.group("Opacity");
-  table.add("update", &Options::update, {{"posterior", UpdateRule::kPosterior}, {"roxels", UpdateRule::kRoxels}})
+  table
+      .add("update", &Options::update,
+           {{"posterior", UpdateRule::kPosterior}, {"roxels", UpdateRule::kRoxels}})
       .help("How a pass updates opacities")
       .source("docs/passes.md; [DeBonet99]");
   table.add("spatial-prior", &Options::spatial_prior)
       .help("Weight of the neighbours' opacity in the prior: surfaces are sheets")
       .range(0, 1);
-  table.add("prior-strength", &Options::prior_strength).help("Weight of the prior").unit("observations").at_least(0);
-  table.add("prior-opacity", &Options::prior_opacity).help("Opacity of a voxel about which nothing is known").above(0).below(1);
+  table.add("prior-strength", &Options::prior_strength)
+      .help("Weight of the prior")
+      .unit("observations")
+      .at_least(0);
+  table.add("prior-opacity", &Options::prior_opacity)
+      .help("Opacity of a voxel about which nothing is known")
+      .above(0)
+      .below(1);
   table.add("ray-weights", &Options::ray_weights)
       .help("Weigh opacity sums, too, by how near a ray passes to the voxel's centre");
   table.add("opacity-threshold", &Options::opacity_threshold)

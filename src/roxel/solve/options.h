@@ -1,6 +1,6 @@
 #pragma once
-/// Everything a user may choose about a reconstruction. Each field's name on the command line, range, unit and
-/// source stand once, in reconstruct_option_table().
+/// Everything a user may choose about a reconstruction. Each field's name on the command line, range, unit
+/// and source stand once, in reconstruct_option_table().
 
 #include <array>
 #include <optional>

@@ -59,8 +59,8 @@ PassRecord make_record(int level, int pass, const Volume& volume, const PassRepo
   return record;
 }
 
-Volume first_volume(const Scene& scene, const std::vector<SampleNode>& samples, const ReconstructOptions& options,
-                    const RunContext& context, const Volume* initial) {
+Volume first_volume(const Scene& scene, const std::vector<SampleNode>& samples,
+                    const ReconstructOptions& options, const RunContext& context, const Volume* initial) {
   Volume volume(reached_voxels(frames_of_first_level(scene, options), samples, context));
   volume.resize_channels();
   std::fill(volume.tau.begin(), volume.tau.end(), tau_from_alpha(static_cast<float>(options.prior_opacity)));
@@ -77,15 +77,16 @@ RefineOptions refine_options(const ReconstructOptions& options) {
 }
 
 /// Passes until the opacities rest or the limit is reached; returns whether they rest.
-bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions& options, int level, bool first_ever,
-                const RunContext& context, LevelProgress& progress, const ReconstructHooks& hooks, const Scene& scene,
-                Volume& volume, Summary& summary) {
+bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions& options, int level,
+                bool first_ever, const RunContext& context, LevelProgress& progress,
+                const ReconstructHooks& hooks, const Scene& scene, Volume& volume, Summary& summary) {
   PassOptions pass_opts = pass_options(scene, options);
   for (int pass = 1; pass <= options.passes; ++pass) {
     const auto start = Clock::now();
     pass_opts.everywhere = first_ever && pass == 1;
-    const PassReport report = run_pass(samples, pass_opts, context,
-                                       [&](double fraction) { progress.report(level, pass, fraction); }, volume);
+    const PassReport report = run_pass(
+        samples, pass_opts, context, [&](double fraction) { progress.report(level, pass, fraction); },
+        volume);
     summary.passes.push_back(make_record(level, pass, volume, report, seconds_since(start)));
     if (hooks.after_pass) hooks.after_pass(summary.passes.back());
     if (!options.all_passes && report.update.mean_opacity_change < options.tolerance) return true;
@@ -126,7 +127,8 @@ void initialise_from(const Volume& initial, Volume& volume) {
           const std::uint32_t from = initial.index(source).slot(cell.array().floor().cast<int>().matrix());
           if (from == kNoSlot) continue;
           // Optical depth is per voxel length: it scales with the voxel's size.
-          volume.tau[slot] = static_cast<float>(initial.tau[from] * index.frame().voxel_size / frame.voxel_size);
+          volume.tau[slot] =
+              static_cast<float>(initial.tau[from] * index.frame().voxel_size / frame.voxel_size);
           volume.color_mean[slot] = initial.color_mean[from];
           volume.color_cov[slot] = initial.color_cov[from];
           volume.color_weight[slot] = initial.color_weight[from];
@@ -137,8 +139,9 @@ void initialise_from(const Volume& initial, Volume& volume) {
   }
 }
 
-Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
-                           RunContext& context, const ReconstructHooks& hooks, double progress_share) {
+Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
+                           const ReconstructOptions& options, RunContext& context,
+                           const ReconstructHooks& hooks, double progress_share) {
   const auto start = Clock::now();
   Reconstruction result;
   Summary& summary = result.summary;
@@ -150,7 +153,8 @@ Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
   for (int level = 1; level <= options.levels; ++level) {
     const auto level_start = Clock::now();
     const double voxel_size = std::ldexp(result.scene.voxel_size, options.levels - level);
-    const std::vector<SampleNode> samples = make_samples(dataset, load, result.scene, voxel_size, options, context);
+    const std::vector<SampleNode> samples =
+        make_samples(dataset, load, result.scene, voxel_size, options, context);
     result.volume = level == 1 ? first_volume(result.scene, samples, options, context, hooks.initial)
                                : refine(result.volume, refine_options(options), context.thread_count());
     LevelRecord record;

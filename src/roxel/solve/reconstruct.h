@@ -24,8 +24,9 @@ struct ReconstructHooks {
 
 /// Throws InvalidInput for bad input or options, Cancelled when the context was cancelled. `context` gets
 /// progress from 0 to `progress_share`.
-Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
-                           RunContext& context, const ReconstructHooks& hooks = {}, double progress_share = 1);
+Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
+                           const ReconstructOptions& options, RunContext& context,
+                           const ReconstructHooks& hooks = {}, double progress_share = 1);
 
 /// The pass options that a scene and its options make.
 PassOptions pass_options(const Scene& scene, const ReconstructOptions& options);

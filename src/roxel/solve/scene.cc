@@ -24,8 +24,8 @@ MatchModel make_model(const ReconstructOptions& options) {
   const double default_scale = (options.agreement == Agreement::kLinear ? 5 : 2.5) * noise;
   model.scale = static_cast<float>(options.agreement_scale.value_or(default_scale));
   model.outlier = static_cast<float>(options.outlier);
-  model.uninformative =
-      static_cast<float>(options.uninformative.value_or(unknown_color_likelihood(options.color_space, noise)));
+  model.uninformative = static_cast<float>(
+      options.uninformative.value_or(unknown_color_likelihood(options.color_space, noise)));
   model.evidence_half = options.predictive ? static_cast<float>(options.evidence_half) : 0.0f;
   return model;
 }
@@ -41,11 +41,13 @@ BoundsOptions bounds_options(const ReconstructOptions& options) {
   return bounds;
 }
 
-/// Lattices around the box until the outermost reaches as far as any ray, each twice as large as the one within.
+/// Lattices around the box until the outermost reaches as far as any ray, each twice as large as the one
+/// within.
 int count_surround(const Dataset& dataset, const SceneBounds& bounds) {
   double reach = 0;
   for (std::size_t v = 0; v < dataset.views.size(); ++v)
-    reach = std::max(reach, (dataset.views[v].camera.pose.centre - bounds.box.center()).norm() + bounds.views[v].far);
+    reach = std::max(
+        reach, (dataset.views[v].camera.pose.centre - bounds.box.center()).norm() + bounds.views[v].far);
   const double half = 0.5 * bounds.box.sizes().maxCoeff();
   return std::clamp(static_cast<int>(std::ceil(std::log2(reach / half))), 1, kMostSurround);
 }
@@ -72,7 +74,8 @@ double choose_exposure(std::vector<float> luminances, std::vector<std::string>& 
   const auto middle = luminances.begin() + luminances.size() / 2;
   std::nth_element(luminances.begin(), middle, luminances.end());
   const double exposure = std::max(1e-12, *middle / kMiddleGrey);
-  notes.push_back("exposure: radiance " + std::to_string(exposure) + " counts as white (high dynamic range images)");
+  notes.push_back("exposure: radiance " + std::to_string(exposure) +
+                  " counts as white (high dynamic range images)");
   return exposure;
 }
 
@@ -86,7 +89,8 @@ Image matching_image(const Photograph& photo, const Scene& scene) {
 }
 
 /// Width of a voxel in pixels at the depth of the box's centre (or half way to far, from inside the box).
-double footprint_px(const PinholeCamera& camera, const Scene& scene, double voxel_size, const Stretch& range) {
+double footprint_px(const PinholeCamera& camera, const Scene& scene, double voxel_size,
+                    const Stretch& range) {
   const double centre_depth = camera.camera_from_world(scene.bounds.box.center()).z();
   const bool outside = !scene.bounds.box.contains(camera.pose.centre) && centre_depth > 0;
   const double depth = outside ? centre_depth : 0.5 * range.end;
@@ -107,10 +111,12 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
   const double longest = scene.bounds.box.sizes().maxCoeff();
   scene.voxel_size = options.voxel_size.value_or(longest / options.resolution);
   if (longest / scene.voxel_size > 65536)
-    throw_invalid("--voxel-size", std::to_string(longest / scene.voxel_size) + " voxels along the longest side",
+    throw_invalid("--voxel-size",
+                  std::to_string(longest / scene.voxel_size) + " voxels along the longest side",
                   "at most 65536");
   scene.notes.push_back("bounds: " + scene.bounds.how);
-  scene.transform = ColorTransform(options.color_space, parse_white_point(options.white_point, "--white-point"));
+  scene.transform =
+      ColorTransform(options.color_space, parse_white_point(options.white_point, "--white-point"));
   scene.model = make_model(options);
   scene.background.unknown_likelihood = static_cast<float>(
       unknown_color_likelihood(options.color_space, std::sqrt(scene.model.noise_variance[0])));
@@ -134,14 +140,17 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
   choose_background(borders, options, scene);
   const bool ends_unknown =
       scene.background.kind == BackgroundKind::kUnknown || scene.background.kind == BackgroundKind::kNone;
-  const bool surround = options.surround == SurroundChoice::kOn || (options.surround == SurroundChoice::kAuto && ends_unknown);
+  const bool surround =
+      options.surround == SurroundChoice::kOn || (options.surround == SurroundChoice::kAuto && ends_unknown);
   scene.surround_count = surround ? count_surround(dataset, scene.bounds) : 0;
-  if (surround) scene.notes.push_back("surround: " + std::to_string(scene.surround_count) + " lattices around the box");
+  if (surround)
+    scene.notes.push_back("surround: " + std::to_string(scene.surround_count) + " lattices around the box");
   return scene;
 }
 
 std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options) {
-  return nested_frames(scene.bounds.box, std::ldexp(scene.voxel_size, options.levels - 1), scene.surround_count);
+  return nested_frames(scene.bounds.box, std::ldexp(scene.voxel_size, options.levels - 1),
+                       scene.surround_count);
 }
 
 Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx) {
@@ -150,14 +159,16 @@ Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx) {
   double farthest = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const auto type = static_cast<Eigen::AlignedBox3d::CornerType>(corner);
-    farthest = std::max(farthest, dataset.views[view_idx].camera.camera_from_world(scene.bounds.box.corner(type)).z());
+    farthest = std::max(farthest,
+                        dataset.views[view_idx].camera.camera_from_world(scene.bounds.box.corner(type)).z());
   }
   range.end = std::max(range.begin, std::min(range.end, 1.01 * farthest + scene.voxel_size));
   return range;
 }
 
 std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
-                                     double voxel_size, const ReconstructOptions& options, const RunContext& context) {
+                                     double voxel_size, const ReconstructOptions& options,
+                                     const RunContext& context) {
   std::vector<SampleView> views(dataset.views.size());
   parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
     context.throw_if_cancelled();
@@ -166,15 +177,18 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
     SamplePlanOptions plan_options;
     plan_options.samples_per_voxel = options.samples_per_voxel;
     plan_options.adaptive = options.adaptive;
-    view.plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size, view_range(scene, dataset, v), plan_options);
+    view.plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size, view_range(scene, dataset, v),
+                                 plan_options);
     const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
     view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
     const Photograph photo = load(dataset.views[v]);
-    view.pyramid = std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground,
-                                                   view.plan.finest_level, view.plan.root_level);
+    view.pyramid =
+        std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground,
+                                        view.plan.finest_level, view.plan.root_level);
   });
   std::vector<SampleNode> nodes(dataset.nodes.size());
-  for (std::size_t v = 0; v < views.size(); ++v) nodes[dataset.views[v].node_idx].push_back(std::move(views[v]));
+  for (std::size_t v = 0; v < views.size(); ++v)
+    nodes[dataset.views[v].node_idx].push_back(std::move(views[v]));
   return nodes;
 }
 
@@ -182,7 +196,8 @@ SampleView make_full_view(const Dataset& dataset, int view_idx, const Photograph
   SampleView view;
   view.camera = dataset.views[view_idx].camera;
   view.plan.range = view_range(scene, dataset, view_idx);
-  view.pyramid = std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground, 0, 0);
+  view.pyramid =
+      std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground, 0, 0);
   return view;
 }
 

@@ -9,13 +9,13 @@ namespace roxel {
 
 struct Scene {
   SceneBounds bounds;
-  double voxel_size = 0;         ///< finest level, world units
-  int surround_count = 0;        ///< lattices around the box
-  ColorTransform transform;      ///< linear RGB / exposure <-> matching space
-  double exposure = 1;           ///< radiance that counts as display white; 1 for 8- and 16-bit images
+  double voxel_size = 0;     ///< finest level, world units
+  int surround_count = 0;    ///< lattices around the box
+  ColorTransform transform;  ///< linear RGB / exposure <-> matching space
+  double exposure = 1;       ///< radiance that counts as display white; 1 for 8- and 16-bit images
   MatchModel model;
   Background background;
-  std::vector<std::string> notes;     ///< what was chosen and why, for people
+  std::vector<std::string> notes;  ///< what was chosen and why, for people
 };
 
 /// Reads every image once. Throws InvalidInput for options that do not fit the data set.
@@ -31,7 +31,8 @@ std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const Recons
 
 /// Loads all views, and prepares their samples for voxels of `voxel_size`.
 std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
-                                     double voxel_size, const ReconstructOptions& options, const RunContext& context);
+                                     double voxel_size, const ReconstructOptions& options,
+                                     const RunContext& context);
 
 /// One view in the matching space, all pixels: what depth and error maps are made from.
 SampleView make_full_view(const Dataset& dataset, int view_idx, const Photograph& photo, const Scene& scene);

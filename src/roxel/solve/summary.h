@@ -17,7 +17,7 @@ struct PassRecord {
   double mean_log_likelihood = 0;  ///< per observation
   double mean_opacity_change = 0;
   double mean_opacity = 0;
-  double seconds = 0;          ///< wall time of the pass
+  double seconds = 0;  ///< wall time of the pass
   double color_seconds = 0;
   double opacity_seconds = 0;  ///< wall time of the opacity half, the node's own colours included
   double ns_per_step = 0;      ///< of the opacity march alone, per core
