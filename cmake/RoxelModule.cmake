@@ -5,6 +5,9 @@
 add_library(roxel_flags INTERFACE)
 target_compile_options(roxel_flags INTERFACE
   -Wall -Wextra -Wshadow -Wno-sign-compare -fno-math-errno -fno-trapping-math)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  target_compile_options(roxel_flags INTERFACE -Wno-restrict)  # GCC 12 sees overlaps in "a" + std::string
+endif()
 if(ROXEL_SANITIZE)
   target_compile_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE})
