@@ -38,7 +38,7 @@ class Sheets : public ::testing::Test {
   }
   static double middle(int k) { return 1 + kVoxel * (k + 0.5); }
 
-  DepthMap estimate(const DepthOptions& options, const float color[3] = kColor) {
+  DepthMap estimate(const DepthOptions& options, const float color[3] = kColor, const Mask& foreground = {}) {
     const LatticeStack stack(volume_);
     NodeScratch scratch(stack, volume_.tau);
     Totals totals(volume_.slot_count());
@@ -50,8 +50,8 @@ class Sheets : public ::testing::Test {
     }
     PinholeCamera camera;
     camera.intrinsics = {8, 8, 40, 40, 4, 4, 0};
-    const SampleNode node{
-        view_of(camera, plain_image(8, {color[0], color[1], color[2]}), plan_of({0.5, 5}, 0))};
+    const SampleNode node{view_of(camera, plain_image(8, {color[0], color[1], color[2]}),
+                                  plan_of({0.5, 5}, 0), {}, foreground)};
     return estimate_depth(stack, node, node, pass_, totals, options, RunContext(1), scratch).front();
   }
 
@@ -171,6 +171,18 @@ TEST_F(Sheets, PredictionLeavesTheNodesOwnColoursOut) {
   const DepthMap fooled =
       estimate_depth(stack, node, node, pass_, totals, {}, RunContext(1), scratch).front();
   EXPECT_GT(*fooled.opacity.pixel(4, 4), 0.99);
+}
+
+TEST_F(Sheets, AMaskedPixelIsObjectWhereMostOfItIs) {
+  build({{7, 0.6}});
+  pass_.opacity.background.kind = BackgroundKind::kMask;
+  const DepthMap mostly = estimate({}, kColor, Mask(8, 8, 200));
+  const DepthMap hardly = estimate({}, kColor, Mask(8, 8, 100));
+  for (int i = 0; i < 64; ++i) {
+    EXPECT_NEAR(mostly.depth.data()[i], middle(7), 0.5 * kVoxel);
+    EXPECT_NEAR(mostly.opacity.data()[i], 1, 1e-3);
+    EXPECT_EQ(hardly.depth.data()[i], 0);
+  }
 }
 
 TEST_F(Sheets, StopsWhenCancelled) {
