@@ -406,7 +406,11 @@ class OtherCommands(Case):
         self.assertGreater(within["4"], 0.5)
         self.assertLess(metrics["depth"]["share_of_empty_given_depth"], 0.2)
         self.assertEqual(len(metrics["depth"]["views"]), 4)
-        # True depth that is off by two voxels must be seen to be off.
+        # Measured against the truth of another world, it is wrong.
+        other = self.folder / "other-world"
+        self.succeed("synth", "demo", "-o", other, "--images", 5, "--size", "64x48", "--seed", 9, "--quiet")
+        wrong = json.loads(self.succeed("eval", self.run_folder, "--truth", other, "--json").stdout)
+        self.assertLess(wrong["depth"]["share_within_voxels"]["1"], 0.8 * within["1"])
         self.expect_error(2, "no folder depth", "eval", self.run_folder, "--truth", self.folder)
 
     def test_merge_of_halves_has_the_voxels_of_both(self):
@@ -447,6 +451,19 @@ class OtherCommands(Case):
         self.assertGreater(info["estimate"]["memory_bytes"], 1e6)
         fine = json.loads(self.succeed("info", self.data, "--json", "--resolution", "512").stdout)
         self.assertTrue(any("pixel" in warning for warning in fine["warnings"]), fine["warnings"])
+
+    def test_info_foresees_what_a_run_needs(self):
+        data = self.folder / "larger"
+        self.synth(data, 8, "160x120")
+        size = ["--resolution", "64", "--passes", "1", "--threads", "2"]
+        foreseen = json.loads(self.succeed("info", data, *size, "--json").stdout)["estimate"]
+        self.succeed("reconstruct", data, "-o", self.folder / "larger-run", *size, "--no-depth", "--no-render", "--quiet")
+        used = json.loads((self.folder / "larger-run/summary.json").read_text())
+        pairs = {"memory": (foreseen["memory_bytes"], used["peak_memory_bytes"])}
+        for i, level in enumerate(used["levels"]):
+            pairs[f"voxels of level {i + 1}"] = (foreseen["levels"][i]["voxels"], level["voxels_in_box"])
+        for name, (expected, found) in pairs.items():
+            self.assertTrue(0.5 < expected / found < 2, f"{name}: {expected} foreseen, {found} found")
 
     def test_synth_depends_on_its_seed_alone(self):
         worlds = {}
@@ -508,6 +525,36 @@ class Interrupt(Case):
         left = files_below(out) if out.exists() else []
         self.assertNotIn("summary.json", left)
         self.assertEqual([f for f in left if pathlib.Path(f).name.startswith(".")], [])
+
+
+class Terminal(Case):
+    def test_a_bar_is_drawn_over_at_most_ten_times_a_second(self):
+        import pty
+        ours, theirs = pty.openpty()
+        start = time.monotonic()
+        job = subprocess.Popen([ROXEL, "reconstruct", str(self.data), "-o", str(self.folder / "run"), "--resolution", "32",
+                                "--all-passes"], stdout=subprocess.DEVNULL, stderr=theirs)
+        os.close(theirs)
+        seen = b""
+        while True:
+            try:
+                part = os.read(ours, 4096)
+            except OSError:  # the other end is closed
+                break
+            if not part:
+                break
+            seen += part
+        self.assertEqual(job.wait(timeout=60), 0)
+        seconds = time.monotonic() - start
+        drawn = seen.decode().split("\r\033[K")
+        self.assertEqual(drawn[0], "")
+        self.assertEqual(drawn[-1], "", "the bar stays behind")
+        self.assertLess(len(drawn), 10 * seconds + 5)
+        percents = [int(m[1]) for m in (re.search(r"\] +(\d+) %", d) for d in drawn) if m]
+        self.assertGreater(len(percents), 3)
+        self.assertEqual(percents, sorted(percents))
+        self.assertIn("volume [", seen.decode())
+        self.assertRegex(seen.decode(), r"level \d/3, pass \d/8")
 
 
 def main():

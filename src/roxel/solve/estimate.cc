@@ -18,7 +18,7 @@ constexpr double kSheetFactor = 3.6;
 constexpr double kCrossedShare = 0.43;
 constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
 constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level
-constexpr double kSurroundShare = 0.22;      ///< of the box's voxels, for each surround lattice
+constexpr double kSurroundShare = 0.45;      ///< of the box's voxels, for each surround lattice
 constexpr double kSurroundSteps = 8;         ///< more steps a ray for each surround lattice
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
@@ -31,9 +31,9 @@ constexpr double kLoadPixelNs = 60;
 constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8;
 constexpr double kTotalsBytes = 80 + 24;
 constexpr double kScratchBytes = 64;
-constexpr double kVoxelsPerBrick = 180;
+constexpr double kVoxelsPerBrick = 150;
 constexpr double kWritingBytesPerBrick = 36 * 1024;
-constexpr double kProgramBytes = 110e6;  ///< libraries
+constexpr double kProgramBytes = 140e6;  ///< libraries
 constexpr double kDecodedBytesPerPixel = 40;
 
 double pixel_count(const View& view) {
