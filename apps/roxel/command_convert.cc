@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "command.h"
 #include "common.h"
@@ -70,17 +69,8 @@ void write_view(const fs::path& folder, const PhotographLoader& load, View& view
   view.lens.intrinsics = view.camera.intrinsics;
 }
 
-void check_names(const Dataset& dataset) {
-  std::set<std::string> names;
-  for (const View& view : dataset.views)
-    if (!names.insert(view.name).second)
-      throw_invalid(view.image_path, "a second image named " + view.name,
-                    "names that differ without their suffix");
-}
-
 int run_convert(const Invocation& invocation, const ConvertOptions& options) {
   Input input = read_input(invocation.inputs.front(), options.input);
-  check_names(input.dataset);
   if (fs::exists(invocation.output) && fs::equivalent(invocation.output, invocation.inputs.front()))
     throw_invalid("-o", "the data set itself", "another folder");
   const OutputFolder folder(invocation.output);

@@ -21,8 +21,9 @@ OptionTable<InfoOptions> info_table() {
 }
 
 int run_info(const Invocation& invocation, const InfoOptions& options) {
-  const Input input = read_input(invocation.inputs.front(), options.input);
+  Input input = read_input(invocation.inputs.front(), options.input);
   Session session(options.common);
+  input.load = session.cancellable(input.load);
   const Description description = describe(input, options.reconstruct, session.context());
   print_result(options.common, description.text, json_text(description.json));
   return 0;

@@ -129,9 +129,13 @@ class Run {
     const OutputFolder folder(invocation_.output);
     for (const std::string& warning : input_.dataset.warnings) warn(options_.common, warning);
     Session session(options_.common);
+    input_.load = session.cancellable(input_.load);
     hashes_ = hash_images(input_.dataset, session.context());
     stopwatch_.lap();
     make_volume(session, initial ? &initial->volume : nullptr);
+    if (initial && initial->info.exposure != made_.scene.exposure)
+      warn(options_.common,
+           "--init: that run has another exposure, so its colours are brighter or darker than here");
     remove_results(invocation_.output);
     write_volume_files(session);
     write_views(session);
@@ -141,8 +145,9 @@ class Run {
   }
 
  private:
-  int describe_only() const {
+  int describe_only() {
     Session session(options_.common);
+    input_.load = session.cancellable(input_.load);
     const Description description = describe(input_, options_.reconstruct, session.context());
     session.display().clear();
     print_result(options_.common, description.text, json_text(description.json));

@@ -102,6 +102,13 @@ Input read_input(const std::string& path, const InputOptions& options) {
   return input;
 }
 
+PhotographLoader Session::cancellable(PhotographLoader load) const {
+  return [this, load = std::move(load)](const View& view) {
+    context_.throw_if_cancelled();
+    return load(view);
+  };
+}
+
 Session::Session(const CommonOptions& options)
     : display_(talk(options), isatty(STDERR_FILENO) != 0, stderr),
       context_(options.threads.value_or(0), [this](const Progress& progress) { display_.update(progress); }) {

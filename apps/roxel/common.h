@@ -54,6 +54,8 @@ class Session {
 
   RunContext& context() { return context_; }
   ProgressDisplay& display() { return display_; }
+  /// The loader, but it throws Cancelled after Ctrl-C: for work that looks at images and knows no context.
+  PhotographLoader cancellable(PhotographLoader load) const;
 
  private:
   ProgressDisplay display_;

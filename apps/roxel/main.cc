@@ -76,6 +76,7 @@ int run(const std::vector<std::string>& arguments) {
     return kBadInput;
   }
   const std::string& name = arguments.front();
+  if (name == "help" && arguments.size() == 2) return run({arguments[1], "--help"});
   if (name == "--help" || name == "-h" || name == "help")
     return std::fputs(overview(commands).c_str(), stdout), kDone;
   if (name == "--version") return std::printf("roxel %s\n", ROXEL_VERSION), kDone;

@@ -123,6 +123,7 @@ class Usage(Case):
             text = self.succeed(command, "--help").stdout
             self.assertIn(f"Usage: roxel {command} ", text)
             self.assertIn("--config", text)
+            self.assertEqual(self.succeed("help", command).stdout, text)
             self.assertIn(f"\n  {command} ", self.succeed("--help").stdout)
         self.assertRegex(self.succeed("--version").stdout, r"^roxel \d+\.\d+\.\d+$")
 
@@ -141,6 +142,15 @@ class Usage(Case):
         (broken / "images/002.png").write_bytes((broken / "images/002.png").read_bytes()[:500])
         self.expect_error(2, "002.png", "reconstruct", broken, "-o", self.folder / "deep/run", *TINY)
         self.assertFalse((self.folder / "deep").exists())
+
+    def test_images_that_differ_in_their_suffix_only_are_refused(self):
+        twins = self.folder / "twins"
+        shutil.copytree(self.data, twins)
+        shutil.rmtree(twins / "sparse")
+        cameras = (twins / "transforms.json").read_text()
+        (twins / "transforms.json").write_text(cameras.replace("images/001.png", "images/000.PNG"))
+        shutil.copy(twins / "images/001.png", twins / "images/000.PNG")
+        self.expect_error(2, "for the second time", "reconstruct", twins, "-o", self.folder / "twins-run", *TINY)
 
     def test_a_dry_run_writes_nothing_and_says_what_info_says(self):
         before = files_below(self.folder)

@@ -23,8 +23,8 @@ constexpr double kSurroundSteps = 8;         ///< more steps a ray for each surr
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
 // Nanoseconds on one core: a ray-voxel step of the colour and the opacity march, loading a pixel.
-constexpr double kColorStepNs = 45;
-constexpr double kOpacityStepNs = 45;
+constexpr double kColorStepNs = 55;
+constexpr double kOpacityStepNs = 55;
 constexpr double kLoadPixelNs = 60;
 
 // Bytes a voxel: channels of the volume, totals of a pass, and a worker's scratch.
@@ -35,6 +35,7 @@ constexpr double kVoxelsPerBrick = 150;
 constexpr double kWritingBytesPerBrick = 36 * 1024;
 constexpr double kProgramBytes = 140e6;  ///< libraries
 constexpr double kDecodedBytesPerPixel = 40;
+constexpr double kResultBytesPerPixel = 120;  ///< depth map, rendering, pictures
 
 double pixel_count(const View& view) {
   return static_cast<double>(view.camera.intrinsics.width) * view.camera.intrinsics.height;
@@ -103,7 +104,8 @@ LevelEstimate estimate_level(const Scene& scene, double voxel_size, bool first_l
 double level_bytes(const LevelEstimate& level, const SampleLoad& load, double largest_image, int threads) {
   const double bricks = level.voxels / kVoxelsPerBrick;
   const double volume = level.voxels * kChannelBytes + bricks * sizeof(Brick);
-  const double passing = level.voxels * (kTotalsBytes + kScratchBytes * threads) + load.bytes;
+  const double passing = level.voxels * (kTotalsBytes + kScratchBytes * threads) + load.bytes +
+                         threads * largest_image * kResultBytesPerPixel;  // depth is last, beside the same
   const double loading = load.bytes + threads * largest_image * kDecodedBytesPerPixel;
   return kProgramBytes + volume + std::max({passing, loading, bricks * kWritingBytesPerBrick});
 }
