@@ -11,6 +11,7 @@
 PRESET ?= release
 JOBS ?= $(shell nproc)
 export ROXEL_COMPILER_LAUNCHER ?= $(shell command -v ccache)
+export CCACHE_SLOPPINESS ?= pch_defines,time_macros
 
 .PHONY: all setup configure build test demo bench format docs clean
 all: build

@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"ThinPrismFisheye",
                            lens(LensModel::kThinPrismFisheye, {0.01, 0, 0.002, -0.003, 0, 0, 0.004, 0.002})},
                       Case{"Fov", lens(LensModel::kFov, {0.8})}),
-    [](const auto& info) { return std::string(info.param.name); });
+    [](const auto& test) { return std::string(test.param.name); });
 
 TEST(UndistortMap, WithoutDistortionCopiesBitForBit) {
   const Lens l = lens(LensModel::kOpenCv, {});
