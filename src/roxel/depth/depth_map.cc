@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "roxel/march/brick_sight.h"
+
 namespace roxel {
 
 namespace {
@@ -77,7 +79,7 @@ class PixelDepthMarch {
         box_slots_(stack.volume().box_slot_count()),
         march_(stack, scratch, pass.opacity.model, pass.opacity.background, pass.opacity.filters) {}
 
-  PixelDepth at(const SampleView& view, int x, int y) {
+  PixelDepth at(const SampleView& view, const BrickSight& sight, int x, int y) {
     const Region region{0, x, y};
     RegionStats sample = view.pyramid->at(0, x, y);
     if (sample.valid <= 0) return {};
@@ -87,7 +89,8 @@ class PixelDepthMarch {
     shares_.clear();
     RemovedColor removed;
     const Ray ray = region_ray(view, region);
-    const Segment whole = march_.march(view, region, sample, ray, view.plan.range, removed, steps_);
+    const Segment whole = march_.march(view, region, sample, ray, view.plan.range, sight.at(x + 0.5, y + 0.5),
+                                       removed, steps_);
     const float background = background_likelihood(pass_.opacity.background, pass_.opacity.model, sample);
     const float z = whole.likelihood + whole.transmittance * background;
     float transmittance = 1, total = 0, in_world = 0;
@@ -126,11 +129,12 @@ std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode
   std::vector<DepthMap> maps;
   for (const SampleView& view : views) {
     const int width = view.camera.intrinsics.width, height = view.camera.intrinsics.height;
+    const BrickSight sight(stack, view.camera);
     DepthMap map{Image(width, height, 1), Image(width, height, 1), Image(width, height, 1)};
     for (int y = 0; y < height; ++y) {
       context.throw_if_cancelled();
       for (int x = 0; x < width; ++x) {
-        const PixelDepth pixel = march.at(view, x, y);
+        const PixelDepth pixel = march.at(view, sight, x, y);
         *map.depth.pixel(x, y) = pixel.depth;
         *map.variance.pixel(x, y) = pixel.variance;
         *map.opacity.pixel(x, y) = pixel.opacity;

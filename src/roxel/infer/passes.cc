@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "roxel/march/brick_sight.h"
+
 namespace roxel {
 
 PassCounts& PassCounts::operator+=(const PassCounts& other) {
@@ -14,15 +16,28 @@ PassCounts& PassCounts::operator+=(const PassCounts& other) {
 
 namespace {
 
-/// Calls visit(view, region) for every root sample of the node, in a fixed order.
+/// A view under way, with where its rays can meet anything.
+struct ViewInSight {
+  const SampleView& view;
+  BrickSight sight;
+};
+
+/// Calls visit(view in sight, region) for every root sample of the node, in a fixed order: tile by tile, so
+/// that the voxels of neighbouring rays are still in the cache.
 template <class Visit>
-void for_each_root(const SampleNode& node, const RunContext& context, Visit&& visit) {
+void for_each_root(const LatticeStack& stack, const SampleNode& node, const RunContext& context,
+                   Visit&& visit) {
+  constexpr int kTile = 32;
   for (const SampleView& view : node) {
+    const ViewInSight in_sight{view, BrickSight(stack, view.camera)};
     const int level = view.plan.root_level;
-    for (int y = 0; y < view.pyramid->height(level); ++y) {
-      context.throw_if_cancelled();
-      for (int x = 0; x < view.pyramid->width(level); ++x) visit(view, Region{level, x, y});
-    }
+    const int width = view.pyramid->width(level), height = view.pyramid->height(level);
+    for (int y0 = 0; y0 < height; y0 += kTile)
+      for (int x0 = 0; x0 < width; x0 += kTile) {
+        context.throw_if_cancelled();
+        for (int y = y0; y < std::min(y0 + kTile, height); ++y)
+          for (int x = x0; x < std::min(x0 + kTile, width); ++x) visit(in_sight, Region{level, x, y});
+      }
   }
 }
 
@@ -32,16 +47,17 @@ class ColorMarch {
              bool everywhere, NodeScratch& scratch)
       : stack_(stack), model_(model), background_(background), everywhere_(everywhere), scratch_(scratch) {}
 
-  void march(const SampleView& view, const Region& region, double begin, float transmittance) {
+  void march(const ViewInSight& in_sight, const Region& region, double begin, float transmittance) {
+    const SampleView& view = in_sight.view;
     const RegionStats sample = view.pyramid->at(region.level, region.x, region.y);
-    if (sample.valid <= 0) return;
+    if (sample.valid <= 0 || sample.foreground <= 0) return;
     const Stretch range = served_range(view, region, begin);
-    if (range.end > range.begin) transmittance = deposit(view, region, sample, range, transmittance);
+    if (range.end > range.begin) transmittance = deposit(in_sight, region, sample, range, transmittance);
     if (range.end >= view.plan.range.end || region.level == view.plan.finest_level) return;
     if (!everywhere_ && transmittance < kOpaque) return;
     for (int c = 0; c < 4; ++c)
       if (const Region child = region.child(c); inside(view, child))
-        march(view, child, std::max(range.begin, range.end), transmittance);
+        march(in_sight, child, std::max(range.begin, range.end), transmittance);
   }
 
   PassCounts counts;
@@ -50,8 +66,9 @@ class ColorMarch {
   static constexpr float kOpaque = 1e-4f;
   static constexpr float kNothing = 1e-7f;  ///< weights that cannot matter against evidence of order 1
 
-  float deposit(const SampleView& view, const Region& region, const RegionStats& sample, Stretch range,
+  float deposit(const ViewInSight& in_sight, const Region& region, const RegionStats& sample, Stretch range,
                 float transmittance) {
+    const SampleView& view = in_sight.view;
     const float weight =
         observation_weight(view, region, sample) * sample.foreground *
         (1 - (background_.kind == BackgroundKind::kKnown ? known_background_share(background_, model_, sample)
@@ -62,8 +79,10 @@ class ColorMarch {
     second[4] = sample.cov[4] + sample.mean[0] * sample.mean[2];
     second[5] = sample.cov[5] + sample.mean[1] * sample.mean[2];
     ++counts.rays;
+    const Eigen::Vector2d at = region_centre(view, region);
     stack_.walk_chunks(
-        region_ray(view, region), range, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
+        view.camera.ray(at.x(), at.y()), range, in_sight.sight.at(at.x(), at.y()), chunk_,
+        [&](std::uint32_t brick) { scratch_.enter(brick); },
         [&](const StepChunk& chunk) {
           counts.steps += chunk.count;
           transmittance = add_to_voxels(chunk, sample.mean, second, weight, transmittance);
@@ -125,10 +144,10 @@ class OpacityMarch {
     march_.set_early_stop(options.rule == UpdateRule::kPosterior);
   }
 
-  void root(const SampleView& view, const Region& region) {
+  void root(const ViewInSight& in_sight, const Region& region) {
     tree_.clear();
     steps_.clear();
-    const int top = build(view, region, view.plan.range.begin, RemovedColor{});
+    const int top = build(in_sight, region, in_sight.view.plan.range.begin, RemovedColor{});
     if (top < 0) return;
     const TreeNode& node = tree_[top];
     counts.observation_weight += node.weight;
@@ -145,7 +164,8 @@ class OpacityMarch {
  private:
   /// Marches the region and, depth first, its children; returns its index in tree_, or -1 without valid
   /// pixels.
-  int build(const SampleView& view, const Region& region, double begin, RemovedColor removed) {
+  int build(const ViewInSight& in_sight, const Region& region, double begin, RemovedColor removed) {
+    const SampleView& view = in_sight.view;
     const RegionStats sample = view.pyramid->at(region.level, region.x, region.y);
     if (sample.valid <= 0) return -1;
     const int self = static_cast<int>(tree_.size());
@@ -157,7 +177,9 @@ class OpacityMarch {
     const Stretch range = served_range(view, region, begin);
     if (range.end > range.begin) {
       ++counts.rays;
-      node.own = march_.march(view, region, sample, region_ray(view, region), range, removed, steps_);
+      const Eigen::Vector2d at = region_centre(view, region);
+      node.own = march_.march(view, region, sample, view.camera.ray(at.x(), at.y()), range,
+                              in_sight.sight.at(at.x(), at.y()), removed, steps_);
     }
     node.end_step = static_cast<std::uint32_t>(steps_.size());
     counts.steps += node.end_step - node.first_step;
@@ -167,7 +189,7 @@ class OpacityMarch {
     const bool ends = range.end >= view.plan.range.end || region.level == view.plan.finest_level;
     const bool spent = options_.rule == UpdateRule::kPosterior &&
                        node.own.transmittance < SegmentMarch::kNegligible * node.own.likelihood;
-    if (!ends && !spent) add_children(view, std::max(range.begin, range.end), removed, node);
+    if (!ends && !spent) add_children(in_sight, std::max(range.begin, range.end), removed, node);
     if (ends || spent || node.behind <= 0) {
       node.background = background_likelihood(options_.background, options_.model, sample);
       if (ends || spent) node.behind = node.background;
@@ -180,12 +202,12 @@ class OpacityMarch {
   }
 
   /// The four children are quarter-weight observations of what lies behind: behind = prod Z_c^{share}.
-  void add_children(const SampleView& view, double begin, const RemovedColor& removed, TreeNode& node) {
+  void add_children(const ViewInSight& in_sight, double begin, const RemovedColor& removed, TreeNode& node) {
     float total = 0, log_sum = 0;
     for (int c = 0; c < 4; ++c) {
       const Region child = node.region.child(c);
-      if (!inside(view, child)) continue;
-      const int index = build(view, child, begin, removed);
+      if (!inside(in_sight.view, child)) continue;
+      const int index = build(in_sight, child, begin, removed);
       node.children[c] = index;
       if (index < 0) continue;
       total += tree_[index].weight;
@@ -250,8 +272,8 @@ PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const 
                        const Background& background, bool everywhere, const RunContext& context,
                        NodeScratch& scratch) {
   ColorMarch march(stack, model, background, everywhere, scratch);
-  for_each_root(node, context, [&](const SampleView& view, const Region& region) {
-    march.march(view, region, view.plan.range.begin, 1.0f);
+  for_each_root(stack, node, context, [&](const ViewInSight& in_sight, const Region& region) {
+    march.march(in_sight, region, in_sight.view.plan.range.begin, 1.0f);
   });
   return march.counts;
 }
@@ -259,8 +281,8 @@ PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const 
 PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const OpacityPassOptions& options,
                          const RunContext& context, NodeScratch& scratch) {
   OpacityMarch march(stack, options, scratch);
-  for_each_root(node, context,
-                [&](const SampleView& view, const Region& region) { march.root(view, region); });
+  for_each_root(stack, node, context,
+                [&](const ViewInSight& in_sight, const Region& region) { march.root(in_sight, region); });
   return march.counts;
 }
 

@@ -30,14 +30,18 @@ struct Region {
   Region child(int which) const { return {level - 1, 2 * x + (which & 1), 2 * y + (which >> 1)}; }
 };
 
-/// The ray through the centre of the region, cut at the image border.
-inline Ray region_ray(const SampleView& view, const Region& region) {
-  const double side = std::ldexp(1.0, region.level);
+/// The pixel position of the region's centre, cut at the image border: where its ray goes through.
+inline Eigen::Vector2d region_centre(const SampleView& view, const Region& region) {
+  const int side = 1 << region.level;
   const auto centre = [side](int index, int size) {
-    return 0.5 * (index * side + std::min((index + 1) * side, static_cast<double>(size)));
+    return 0.5 * (index * side + std::min((index + 1) * side, size));
   };
-  return view.camera.ray(centre(region.x, view.camera.intrinsics.width),
-                         centre(region.y, view.camera.intrinsics.height));
+  return {centre(region.x, view.camera.intrinsics.width), centre(region.y, view.camera.intrinsics.height)};
+}
+
+inline Ray region_ray(const SampleView& view, const Region& region) {
+  const Eigen::Vector2d at = region_centre(view, region);
+  return view.camera.ray(at.x(), at.y());
 }
 
 inline bool inside(const SampleView& view, const Region& region) {
@@ -45,7 +49,7 @@ inline bool inside(const SampleView& view, const Region& region) {
 }
 
 inline float observation_weight(const SampleView& view, const Region& region, const RegionStats& sample) {
-  return std::ldexp(sample.valid * view.pixel_weight, 2 * region.level);
+  return sample.valid * view.pixel_weight * static_cast<float>(std::int64_t{1} << (2 * region.level));
 }
 
 /// The stretch of depths that the region's sample serves, from where its parent stopped.

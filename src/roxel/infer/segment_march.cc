@@ -35,7 +35,7 @@ RegionStats SegmentMarch::background_removed(const SampleView& view, const Ray& 
 }
 
 Segment SegmentMarch::march(const SampleView& view, const Region& region, const RegionStats& sample_seen,
-                            const Ray& ray, Stretch range, RemovedColor& removed,
+                            const Ray& ray, Stretch range, const Stretch* sight, RemovedColor& removed,
                             std::vector<EvaluatedStep>& steps) {
   RegionStats sample = sample_seen;
   if (filters_.background && background_.kind == BackgroundKind::kKnown)
@@ -44,7 +44,7 @@ Segment SegmentMarch::march(const SampleView& view, const Region& region, const 
   in_brick_ = {};
   bool running = true;
   stack_.walk_chunks(
-      ray, range, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
+      ray, range, sight, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
       [&](const StepChunk& chunk) {
         running = flush(view, region, sample, chunk, removed, total, steps);
         return running;
@@ -69,7 +69,7 @@ void SegmentMarch::gather(const SampleView& view, const Region& region, const Sa
   if (!filters_.interpolate) return;
   const LatticeFrame& frame = stack_.volume().index(chunk.lattice).frame();
   for (int i = 0; i < chunk.count; ++i) {
-    const Eigen::Vector3d at = view.camera.project(chunk.voxel_centre(frame, i));
+    const Eigen::Vector3d at = view.camera.project(frame.voxel_centre(chunk.voxel(i)));
     float mean[3];
     if (!view.pyramid->bilinear(region.level, at.x(), at.y(), mean)) continue;
     for (int c = 0; c < 3; ++c) block_.diff[c][i] += terms.mean[c] - mean[c];
@@ -106,7 +106,7 @@ bool SegmentMarch::flush(const SampleView& view, const Region& region, const Reg
     *step = {chunk.slot[i],
              block_.length[i],
              chunk.weight[i],
-             chunk.depth[i],
+             chunk.depth(i),
              0.5f * chunk.length[i] * chunk.depth_per_length,
              a,
              p,

@@ -47,10 +47,11 @@ class SegmentMarch {
                const Background& background, const SampleFilters& filters)
       : stack_(stack), scratch_(scratch), model_(model), background_(background), filters_(filters) {}
 
-  /// Marches `ray` over `range`, appends the steps, and returns (T, Z) from the range's begin, folded from
+  /// Marches `ray` over `range` (cut to `sight` unless null, see walk_lattices), appends the steps, and returns (T, Z) from the range's begin, folded from
   /// per-brick segments. Stops early once what lies behind can change Z by less than kNegligible of itself.
   Segment march(const SampleView& view, const Region& region, const RegionStats& sample, const Ray& ray,
-                Stretch range, RemovedColor& removed, std::vector<EvaluatedStep>& steps);
+                Stretch range, const Stretch* sight, RemovedColor& removed,
+                std::vector<EvaluatedStep>& steps);
 
   /// Every step of the roxels rule counts, so its rays must not stop early.
   void set_early_stop(bool on) { early_stop_ = on; }

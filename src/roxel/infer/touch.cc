@@ -77,22 +77,20 @@ class Toucher {
 
  private:
   void touch_along(const Ray& ray, const Stretch& range) {
-    walk_lattices(boxes_, ray, range, [&](int lattice, Stretch stretch) {
+    walk_lattices(boxes_, ray, range, nullptr, [&](int lattice, Stretch stretch) {
       AtomicBrickMask* brick = nullptr;
       const auto enter = [&](int x, int y, int z) {
         brick = reached_[lattice]->brick(x, y, z);
+        return AtBrick::kVisit;
+      };
+      const auto visit = [&](CellCode cell, std::int64_t, std::int64_t) {
+        const int voxel = cell_in_brick(cell);
+        std::atomic<std::uint64_t>& word = brick->words[voxel / 64];
+        const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);
+        if (!(word.load(std::memory_order_relaxed) & bit)) word.fetch_or(bit, std::memory_order_relaxed);
         return true;
       };
-      const auto all = [](int) { return true; };
-      return walk_cells(frames_[lattice], ray, stretch, enter, all,
-                        [&](int packed, std::int64_t, std::int64_t) {
-                          const int voxel = internal::packed_voxel(packed);
-                          std::atomic<std::uint64_t>& word = brick->words[voxel / 64];
-                          const std::uint64_t bit = std::uint64_t{1} << (voxel % 64);
-                          if (!(word.load(std::memory_order_relaxed) & bit))
-                            word.fetch_or(bit, std::memory_order_relaxed);
-                          return true;
-                        });
+      return walk_cells(frames_[lattice], ray, stretch, enter, visit);
     });
   }
 

@@ -25,15 +25,10 @@ struct VoxelStep {
   float depth;   ///< of the chord's middle
 };
 
-/// Where a step's voxel is: a lattice, one of its bricks, and the voxel within the brick.
+/// Where a step's voxel is.
 struct VoxelPlace {
   int lattice;
-  const Brick* brick;
-  int i, j, k;
-
-  Eigen::Vector3d centre(const LatticeFrame& frame) const {
-    return frame.voxel_centre(kBrickSide * brick->coord + Eigen::Vector3i(i, j, k));
-  }
+  Eigen::Vector3i voxel;  ///< in the lattice's frame
 };
 
 /// A stretch of depths, empty where end <= begin.
@@ -58,119 +53,178 @@ inline Stretch clip_to_box(const Ray& ray, const Eigen::AlignedBox3d& box, Stret
   return range;
 }
 
+/// A cell of a frame in one word: three fields of 20 bits, x lowest, each the cell's index plus 2^18, so that
+/// one add steps over any face, also out of the frame.
+using CellCode = std::uint64_t;
+namespace internal {
+inline constexpr int kCellBits = 20;
+inline constexpr int kCellOffset = 1 << 18;  ///< a multiple of the brick's side
+inline constexpr CellCode kCellField = (CellCode{1} << kCellBits) - 1;
+inline constexpr CellCode kCellUnits = 1 | CellCode{1} << kCellBits | CellCode{1} << 2 * kCellBits;
+inline constexpr CellCode kCellInBrick = 7 * kCellUnits;
+}  // namespace internal
+inline CellCode cell_code(int x, int y, int z) {
+  using namespace internal;
+  return CellCode(x + kCellOffset) | CellCode(y + kCellOffset) << kCellBits |
+         CellCode(z + kCellOffset) << 2 * kCellBits;
+}
+/// The cell's index along an axis.
+inline int cell_index(CellCode code, int axis) {
+  using namespace internal;
+  return static_cast<int>(code >> axis * kCellBits & kCellField) - kCellOffset;
+}
+/// voxel_in_brick of the cell.
+inline int cell_in_brick(CellCode code) {
+  using namespace internal;
+  return static_cast<int>((code & 7) | (code >> (kCellBits - 3) & 0x38) | (code >> (2 * kCellBits - 6) & 0x1c0));
+}
+
+/// Positions along a ray inside walk_cells are integers: 2^-28 voxel lengths from the ray's origin. All planes
+/// between cells lie at first + index * distance exactly, so the compares and adds of the walk's chain of
+/// dependent steps are short, and what is found in a cell does not depend on where the walk began.
+inline constexpr double kWalkUnit = 1.0 / (1 << 28);
+
+/// What to do with a brick that a walk comes to.
+enum class AtBrick { kSkip, kVisit, kStop };
+
 namespace internal {
 
-/// A cell of a brick packed into nibbles i, j, k; one step out of [0, 8) on any axis sets a guard bit.
-inline constexpr int kPackedOutside = 0x888;
-inline int pack_cell(int i, int j, int k) { return i | j << 4 | k << 8; }
-inline int packed_i(int p) { return p & 7; }
-inline int packed_j(int p) { return p >> 4 & 7; }
-inline int packed_k(int p) { return p >> 8 & 7; }
-inline int packed_voxel(int p) { return (p & 7) | (p >> 1 & 0x38) | (p >> 2 & 0x1c0); }
+/// One axis of a walk: where the planes between its cells are.
+struct WalkAxis {
+  std::int64_t first;     ///< position of plane 0
+  std::int64_t distance;  ///< between planes, signed; 0 when the ray runs along them
+  int step;               ///< of the cell's index, 0 when the ray runs along the planes
+  int bricks;
+
+  static constexpr std::int64_t kNever = std::int64_t{1} << 62;
+  /// Position at which the ray leaves cells (cell .. cell + side) of a side that begins at `cell`.
+  std::int64_t leaves(int cell, int side) const {
+    return step == 0 ? kNever : first + (cell + (step > 0 ? side : 0)) * distance;
+  }
+  /// The cell at a position, given a guess that is off by rounding at most.
+  int correct(int guess, std::int64_t position) const {
+    if (step == 0) return guess;
+    while (leaves(guess, 1) <= position) guess += step;
+    while (leaves(guess - step, 1) > position) guess -= step;
+    return guess;
+  }
+};
 
 }  // namespace internal
 
-/// Positions along a ray inside walk_cells are integers: 2^-24 voxel lengths from the ray's origin. Integer
-/// compares and adds make the walk's chain of dependent steps short, and do not depend on where a walk
-/// begins.
-inline constexpr double kWalkUnit = 1.0 / (1 << 24);
-
 /// Amanatides-Woo over the cells of one frame within `range`, which must lie inside the frame's box.
-/// `enter(bx, by, bz)` is asked once for each brick and says whether to visit its cells; `wanted(voxel)` says
-/// which cells of it, by voxel_in_brick; `visit(packed cell, in, out)` gets those with their positions (in
-/// kWalkUnit) and returns false to stop. Returns false when stopped.
-template <class Enter, class Wanted, class Visit>
+/// `enter(bx, by, bz)` is asked once for each brick what to do with it; `visit(code, in, out)` gets the cells
+/// of those to visit and the positions (in kWalkUnit) between which the ray is in them, and returns false to
+/// stop. Returns false when stopped.
+template <class Enter, class Visit>
 inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame, const Ray& ray,
-                                                      Stretch range, Enter&& enter, Wanted&& wanted,
-                                                      Visit&& visit) {
+                                                      Stretch range, Enter&& enter, Visit&& visit) {
+  using internal::WalkAxis;
+  // A ray that would need more voxel lengths than this from plane to plane counts as running along them.
+  constexpr double kAlong = 1 << 17;
   const double inverse_size = 1 / frame.voxel_size;
-  const double infinity = std::numeric_limits<double>::infinity();
-  double origin[3], direction[3], inverse[3], delta[3];
-  int step[3], cell[3], cells[3];
+  const double norm = ray.direction.norm() * inverse_size;
+  const double scale = norm / kWalkUnit;
+  std::int64_t in = static_cast<std::int64_t>(range.begin * scale);
+  const std::int64_t end = static_cast<std::int64_t>(range.end * scale);
+  WalkAxis axes[3];
+  int cell[3], brick[3];
   for (int a = 0; a < 3; ++a) {
-    origin[a] = (ray.origin[a] - frame.origin[a]) * inverse_size;
-    direction[a] = ray.direction[a] * inverse_size;
-    step[a] = direction[a] > 0 ? 1 : -1;
-    inverse[a] = direction[a] != 0 ? 1 / direction[a] : infinity;
-    delta[a] = std::abs(inverse[a]);
-    cells[a] = frame.size_in_bricks[a] * kBrickSide;
+    const double origin = (ray.origin[a] - frame.origin[a]) * inverse_size;
+    const double direction = ray.direction[a] * inverse_size;
+    const bool along = std::abs(direction) * kAlong < norm;
+    const double per_cell = along ? 0 : scale / direction;
+    axes[a].distance = static_cast<std::int64_t>(per_cell);
+    axes[a].first = static_cast<std::int64_t>(-origin * per_cell);
+    axes[a].step = along ? 0 : direction > 0 ? 1 : -1;
+    axes[a].bricks = frame.size_in_bricks[a];
+    const int guess = static_cast<int>(origin + range.begin * direction);
+    cell[a] = std::clamp(axes[a].correct(guess, in), 0, axes[a].bricks * kBrickSide - 1);
+    brick[a] = cell[a] >> 3;
   }
-  const auto cell_at = [&](double t, int a) {
-    return std::clamp(static_cast<int>(origin[a] + t * direction[a]), 0, cells[a] - 1);
-  };
-  const double fixed_scale = ray.direction.norm() * inverse_size / kWalkUnit;
-  constexpr double kFarthest = 1e18;
-  constexpr std::int64_t kNever = static_cast<std::int64_t>(kFarthest);
-  const auto fixed = [&](double at) {
-    return static_cast<std::int64_t>(std::min(at * fixed_scale, kFarthest));
-  };
-  const std::int64_t delta_x = fixed(delta[0]), delta_y = fixed(delta[1]), delta_z = fixed(delta[2]);
-  const std::int64_t step_x = step[0], step_y = step[1] * 16, step_z = step[2] * 256;
-  double t = range.begin;
-  for (int a = 0; a < 3; ++a) cell[a] = cell_at(t, a);
-  while (t < range.end) {
-    const int brick[3] = {cell[0] >> 3, cell[1] >> 3, cell[2] >> 3};
-    // Where does the ray leave this brick, and over which axis?
-    double brick_out = infinity;
-    int out_axis = 0;
-    for (int a = 0; a < 3; ++a) {
-      if (direction[a] == 0) continue;
-      const double plane = (brick[a] + (step[a] > 0)) * kBrickSide;
-      const double t_plane = (plane - origin[a]) * inverse[a];
-      if (t_plane < brick_out) brick_out = t_plane, out_axis = a;
-    }
-    const double brick_end = std::min(std::max(brick_out, t), range.end);
-    if (brick_end > t && enter(brick[0], brick[1], brick[2])) {
-      const auto next_plane = [&](int a) {
-        return direction[a] != 0 ? fixed((cell[a] + (step[a] > 0) - origin[a]) * inverse[a]) : kNever;
-      };
-      std::int64_t next_x = next_plane(0), next_y = next_plane(1), next_z = next_plane(2);
-      const std::int64_t end = fixed(brick_end);
-      std::int64_t in = fixed(t);
-      int packed = internal::pack_cell(cell[0] & 7, cell[1] & 7, cell[2] & 7);
-      while (true) {
-        const std::int64_t first = next_x < next_y ? next_x : next_y;
-        const std::int64_t out = first < next_z ? first : next_z;
-        if (wanted(internal::packed_voxel(packed))) {
-          const std::int64_t chord_end = out < end ? out : end;
-          if (chord_end > in && !visit(packed, in, chord_end)) return false;
-        }
-        // Branch-free: every axis whose plane is reached steps.
-        const std::int64_t x = -static_cast<std::int64_t>(next_x == out);
-        const std::int64_t y = -static_cast<std::int64_t>(next_y == out);
-        const std::int64_t z = -static_cast<std::int64_t>(next_z == out);
-        next_x += x & delta_x;
-        next_y += y & delta_y;
-        next_z += z & delta_z;
-        packed += static_cast<int>((x & step_x) + (y & step_y) + (z & step_z));
-        if (out >= end || (packed & internal::kPackedOutside)) break;
-        in = in > out ? in : out;
+  const std::int64_t delta_x = std::abs(axes[0].distance), delta_y = std::abs(axes[1].distance),
+                     delta_z = std::abs(axes[2].distance);
+  const CellCode step_x = static_cast<CellCode>(std::int64_t{axes[0].step}),
+                 step_y = static_cast<CellCode>(std::int64_t{axes[1].step} * (1 << internal::kCellBits)),
+                 step_z =
+                     static_cast<CellCode>(axes[2].step * (std::int64_t{1} << 2 * internal::kCellBits));
+
+  AtBrick what = enter(brick[0], brick[1], brick[2]);
+  while (true) {
+    if (what == AtBrick::kStop) return false;
+    if (what == AtBrick::kSkip) {
+      std::int64_t brick_out = axes[0].leaves(brick[0] * kBrickSide, kBrickSide);
+      int out_axis = 0;
+      for (int a = 1; a < 3; ++a) {
+        const std::int64_t out = axes[a].leaves(brick[a] * kBrickSide, kBrickSide);
+        if (out < brick_out) brick_out = out, out_axis = a;
+      }
+      if (brick_out >= end) return true;
+      in = std::max(brick_out, in);
+      brick[out_axis] += axes[out_axis].step;
+      if (static_cast<unsigned>(brick[out_axis]) >= static_cast<unsigned>(axes[out_axis].bricks)) return true;
+      what = enter(brick[0], brick[1], brick[2]);
+      if (what != AtBrick::kVisit) continue;
+      const double t = static_cast<double>(in) / scale;
+      for (int a = 0; a < 3; ++a) {
+        const int guess =
+            static_cast<int>((ray.origin[a] + t * ray.direction[a] - frame.origin[a]) * inverse_size);
+        const int low = brick[a] * kBrickSide;
+        cell[a] = std::clamp(axes[a].correct(guess, in), low, low + kBrickSide - 1);
       }
     }
-    // Step over the brick's face; the other coordinates are recomputed so that errors do not add up.
-    t = brick_end;
-    if (brick_out >= range.end) return true;
-    for (int a = 0; a < 3; ++a) {
-      if (a == out_axis) {
-        const int next_brick = brick[a] + step[a];
-        if (next_brick < 0 || next_brick >= frame.size_in_bricks[a]) return true;
-        cell[a] = next_brick * kBrickSide + (step[a] > 0 ? 0 : kBrickSide - 1);
-      } else {
-        cell[a] = std::clamp(cell_at(t, a), brick[a] * kBrickSide, brick[a] * kBrickSide + kBrickSide - 1);
+    std::int64_t next_x = axes[0].leaves(cell[0], 1), next_y = axes[1].leaves(cell[1], 1),
+                 next_z = axes[2].leaves(cell[2], 1);
+    CellCode code = cell_code(cell[0], cell[1], cell[2]);
+    // Cell by cell, on through neighbouring bricks as long as they are visited.
+    while (true) {
+      const std::int64_t first = next_x < next_y ? next_x : next_y;
+      const std::int64_t out = first < next_z ? first : next_z;
+      const std::int64_t chord_end = out < end ? out : end;
+      if (chord_end > in && !visit(code, in, chord_end)) return false;
+      if (out >= end) return true;
+      // Branch-free: every axis whose plane is reached steps.
+      const std::int64_t x = -static_cast<std::int64_t>(next_x == out);
+      const std::int64_t y = -static_cast<std::int64_t>(next_y == out);
+      const std::int64_t z = -static_cast<std::int64_t>(next_z == out);
+      next_x += x & delta_x;
+      next_y += y & delta_y;
+      next_z += z & delta_z;
+      const CellCode before = code;
+      code += (static_cast<CellCode>(x) & step_x) + (static_cast<CellCode>(y) & step_y) +
+              (static_cast<CellCode>(z) & step_z);
+      in = in > out ? in : out;
+      if (((code ^ before) & ~internal::kCellInBrick) == 0) continue;
+      bool outside = false;
+      for (int a = 0; a < 3; ++a) {
+        cell[a] = cell_index(code, a);
+        brick[a] = cell[a] >> 3;
+        outside |= static_cast<unsigned>(brick[a]) >= static_cast<unsigned>(axes[a].bricks);
       }
+      if (outside) return true;
+      what = enter(brick[0], brick[1], brick[2]);
+      if (what != AtBrick::kVisit) break;
     }
   }
-  return true;
 }
 
 /// Calls segment(lattice, Stretch) for the stretches of the ray in each lattice, in ray order: outermost
-/// first, inwards to lattice 0, and out again; stops when it returns false.
+/// first, inwards to lattice 0, and out again; stops when it returns false. `sight`, unless null, says for
+/// each lattice between which depths there is anything (BrickSight).
 template <class OnSegment>
 void walk_lattices(const std::vector<Eigen::AlignedBox3d>& boxes, const Ray& ray, Stretch range,
-                   OnSegment&& segment) {
+                   const Stretch* sight, OnSegment&& on_segment) {
   const int count = static_cast<int>(boxes.size());
   const auto empty = [](const Stretch& r) { return r.end <= r.begin; };
+  const auto segment = [&](int lattice, Stretch stretch) {
+    if (sight) {
+      stretch = {std::max(stretch.begin, sight[lattice].begin), std::min(stretch.end, sight[lattice].end)};
+      if (empty(stretch)) return true;
+    }
+    return on_segment(lattice, stretch);
+  };
   if (count == 1) {
+    if (sight && empty(sight[0])) return;
     if (const Stretch only = clip_to_box(ray, boxes[0], range); !empty(only)) segment(0, only);
     return;
   }
@@ -198,39 +252,34 @@ void walk_lattices(const std::vector<Eigen::AlignedBox3d>& boxes, const Ray& ray
 /// over.
 struct alignas(64) StepChunk {
   static constexpr int kSize = 64;
+  /// Steps that make a chunk worth handing over at a brick's border: rays then stop soon behind a surface.
+  static constexpr int kEnough = 16;
 
   int count = 0;
   int lattice = 0;
   std::uint32_t slot[kSize];
-  float length[kSize];      ///< chord, in voxel lengths of the lattice
-  float depth[kSize];       ///< of the chord's middle
-  float weight[kSize];      ///< ray weight
-  bool brick_start[kSize];  ///< first step in its brick: where segments break (docs/rays.md)
-  const Brick* brick[kSize];
-  int packed[kSize];       ///< the voxel in its brick, see internal::pack_cell
-  float depth_per_length;  ///< extent in depth of a chord of one voxel length
+  float length[kSize];         ///< chord, in voxel lengths of the lattice
+  float weight[kSize];         ///< ray weight
+  std::uint8_t brick_start[kSize];  ///< 1: first step in its brick, where segments break (docs/rays.md)
+  CellCode cell[kSize];        ///< the voxel in the lattice's frame
+  std::int64_t middle[kSize];  ///< twice the position of the chord's middle, in kWalkUnit
+  float depth_per_length;      ///< extent in depth of a chord of one voxel length
 
-  Eigen::Vector3d voxel_centre(const LatticeFrame& frame, int i) const {
-    return frame.voxel_centre(kBrickSide * brick[i]->coord + Eigen::Vector3i(internal::packed_i(packed[i]),
-                                                                             internal::packed_j(packed[i]),
-                                                                             internal::packed_k(packed[i])));
+  /// Depth of the chord's middle.
+  float depth(int i) const {
+    return static_cast<float>(static_cast<double>(middle[i]) * (0.5 * kWalkUnit * depth_per_length_));
+  }
+  Eigen::Vector3i voxel(int i) const {
+    return {cell_index(cell[i], 0), cell_index(cell[i], 1), cell_index(cell[i], 2)};
   }
 
-  // From a point of the ray to the voxel's centre, in voxel lengths; set_weights turns it into weights.
-  float from_ray[3][kSize];
-  /// weight = 1 - d / (sqrt(3)/2), d the distance of the ray's line from the voxel's centre: 1 through the
-  /// centre, 0 through a vertex. [Jethwa04] section 5.1.1. `u` is the ray's unit direction.
-  void set_weights(const float u[3]) {
-    constexpr float kInverseVertexDistance = 1.1547005383792515f;
-    const float ux = u[0], uy = u[1], uz = u[2];
-    for (int i = 0; i < count; ++i) {
-      const float x = from_ray[0][i], y = from_ray[1][i], z = from_ray[2][i];
-      // A cross product: |p|^2 - (p u)^2 would lose the digits of d far from the stretch's middle.
-      const float cx = y * uz - z * uy, cy = z * ux - x * uz, cz = x * uy - y * ux;
-      const float d = std::sqrt(cx * cx + cy * cy + cz * cz) * kInverseVertexDistance;
-      weight[i] = d < 1 ? 1 - d : 0.0f;
-    }
-  }
+ private:
+  friend class LatticeStack;
+  /// Fills `weight`: 1 - d / (sqrt(3)/2), d the distance of the ray's line from the voxel's centre: 1 through
+  /// the centre, 0 through a vertex. [Jethwa04] section 5.1.1. `direction` is the ray's unit direction, `near`
+  /// a point of it near the chunk, in voxels of the frame.
+  void set_weights(const float direction[3], const double near[3]);
+  double depth_per_length_;
 };
 
 /// What a walk needs of a volume, gathered once.
@@ -258,67 +307,66 @@ class LatticeStack {
 
   /// Yields the existing voxels within `range` in chunks. `on_brick(number)` is called before the first voxel
   /// of each existing brick; `on_chunk(chunk)` gets at most `chunk_size` steps and returns false to stop.
+  /// `sight`: see walk_lattices.
   template <class OnBrick, class OnChunk>
-  void walk_chunks(const Ray& ray, Stretch range, StepChunk& chunk, OnBrick&& on_brick, OnChunk&& on_chunk,
-                   int chunk_size = StepChunk::kSize) const {
+  void walk_chunks(const Ray& ray, Stretch range, const Stretch* sight, StepChunk& chunk, OnBrick&& on_brick,
+                   OnChunk&& on_chunk, int chunk_size = StepChunk::kSize) const {
     const double norm = ray.direction.norm();
-    const Eigen::Vector3d unit = ray.direction / norm;
-    const float unit_f[3] = {static_cast<float>(unit.x()), static_cast<float>(unit.y()),
-                             static_cast<float>(unit.z())};
-    const auto hand_over = [&](int count) __attribute__((noinline)) {
-      chunk.count = count;
-      chunk.set_weights(unit_f);
-      return on_chunk(static_cast<const StepChunk&>(chunk));
-    };
-    walk_lattices(boxes_, ray, range, [&](int lattice, Stretch stretch) {
+    const double inverse_norm = 1 / norm;
+    const float unit[3] = {static_cast<float>(ray.direction.x() * inverse_norm),
+                           static_cast<float>(ray.direction.y() * inverse_norm),
+                           static_cast<float>(ray.direction.z() * inverse_norm)};
+    walk_lattices(boxes_, ray, range, sight, [&](int lattice, Stretch stretch) {
       const BrickIndex& index = volume_->index(lattice);
       const LatticeFrame& frame = index.frame();
       const std::int32_t* table = index.table();
       const Brick* bricks = index.bricks().data();
       const int nx = frame.size_in_bricks.x(), ny = frame.size_in_bricks.y();
-      const double length_scale = norm / frame.voxel_size;
       // A point of the ray near the stretch: relative to it floats do.
       const double middle = 0.5 * (stretch.begin + stretch.end);
-      const Eigen::Vector3d near = (ray.origin + middle * ray.direction - frame.origin) / frame.voxel_size;
-      const Brick* brick = nullptr;
+      const double near[3] = {(ray.origin.x() + middle * ray.direction.x() - frame.origin.x()) / frame.voxel_size,
+                              (ray.origin.y() + middle * ray.direction.y() - frame.origin.y()) / frame.voxel_size,
+                              (ray.origin.z() + middle * ray.direction.z() - frame.origin.z()) / frame.voxel_size};
       const std::uint16_t* local = nullptr;
-      float brick_from_ray[3] = {0, 0, 0};
-      bool starts_brick = false;
+      std::uint32_t first_slot = 0;
+      std::uint8_t starts_brick = 0;
       chunk.lattice = lattice;
-      chunk.depth_per_length = static_cast<float>(1 / length_scale);
-      const auto enter = [&](int bx, int by, int bz) {
+      chunk.depth_per_length_ = frame.voxel_size * inverse_norm;
+      chunk.depth_per_length = static_cast<float>(chunk.depth_per_length_);
+      int n = 0;
+      const auto hand_over = [&]() __attribute__((noinline)) {
+        chunk.count = n;
+        n = 0;
+        chunk.set_weights(unit, near);
+        return on_chunk(static_cast<const StepChunk&>(chunk));
+      };
+      const auto enter = [&](int bx, int by, int bz) __attribute__((always_inline)) {
         const std::int32_t found =
             table[bx + static_cast<std::size_t>(nx) * (by + static_cast<std::size_t>(ny) * bz)];
-        if (found < 0) return false;
-        brick = bricks + found;
-        local = brick->local.data();
-        brick_from_ray[0] = static_cast<float>(bx * kBrickSide + 0.5 - near.x());
-        brick_from_ray[1] = static_cast<float>(by * kBrickSide + 0.5 - near.y());
-        brick_from_ray[2] = static_cast<float>(bz * kBrickSide + 0.5 - near.z());
-        starts_brick = true;
+        if (found < 0) return AtBrick::kSkip;
+        if (n >= StepChunk::kEnough && !hand_over()) return AtBrick::kStop;
+        local = bricks[found].local.data();
+        first_slot = bricks[found].first_slot;
+        starts_brick = 1;
         on_brick(first_brick_[lattice] + static_cast<std::uint32_t>(found));
-        return true;
+        return AtBrick::kVisit;
       };
-      const auto wanted = [&](int voxel) __attribute__((always_inline)) { return local[voxel] != kNoVoxel; };
-      const double depth_scale = 0.5 * kWalkUnit / length_scale;
-      int n = 0;
-      const auto visit = [&](int packed, std::int64_t in, std::int64_t out) __attribute__((always_inline)) {
-        chunk.slot[n] = brick->first_slot + local[internal::packed_voxel(packed)];
-        chunk.length[n] = static_cast<float>(static_cast<double>(out - in) * kWalkUnit);
-        chunk.depth[n] = static_cast<float>(static_cast<double>(in + out) * depth_scale);
-        chunk.from_ray[0][n] = brick_from_ray[0] + static_cast<float>(internal::packed_i(packed));
-        chunk.from_ray[1][n] = brick_from_ray[1] + static_cast<float>(internal::packed_j(packed));
-        chunk.from_ray[2][n] = brick_from_ray[2] + static_cast<float>(internal::packed_k(packed));
+      const auto visit = [&](CellCode code, std::int64_t in, std::int64_t out) __attribute__((always_inline)) {
+        // Written whether there is a voxel or not, counted if there is: cheaper than a branch that is
+        // mispredicted at every surface.
+        const std::uint16_t voxel = local[cell_in_brick(code)];
+        const int exists = voxel != kNoVoxel;
+        chunk.slot[n] = first_slot + voxel;
+        chunk.length[n] = static_cast<float>(out - in) * static_cast<float>(kWalkUnit);
+        chunk.middle[n] = in + out;
+        chunk.cell[n] = code;
         chunk.brick_start[n] = starts_brick;
-        chunk.brick[n] = brick;
-        chunk.packed[n] = packed;
-        starts_brick = false;
-        if (++n < chunk_size) return true;
-        n = 0;
-        return hand_over(chunk_size);
+        starts_brick = static_cast<std::uint8_t>(starts_brick & (exists ^ 1));
+        n += exists;
+        return n < chunk_size || hand_over();
       };
-      if (!walk_cells(frame, ray, stretch, enter, wanted, visit)) return false;
-      return n == 0 || hand_over(n);
+      if (!walk_cells(frame, ray, stretch, enter, visit)) return false;
+      return n == 0 || hand_over();
     });
   }
 
@@ -326,12 +374,10 @@ class LatticeStack {
   template <class OnBrick, class Visit>
   void walk(const Ray& ray, Stretch range, OnBrick&& on_brick, Visit&& visit) const {
     StepChunk chunk;
-    walk_chunks(ray, range, chunk, on_brick, [&](const StepChunk& steps) {
+    walk_chunks(ray, range, nullptr, chunk, on_brick, [&](const StepChunk& steps) {
       for (int n = 0; n < steps.count; ++n) {
-        const VoxelStep step{steps.slot[n], steps.length[n], steps.weight[n], steps.depth[n]};
-        const int p = steps.packed[n];
-        const VoxelPlace place{steps.lattice, steps.brick[n], internal::packed_i(p), internal::packed_j(p),
-                               internal::packed_k(p)};
+        const VoxelStep step{steps.slot[n], steps.length[n], steps.weight[n], steps.depth(n)};
+        const VoxelPlace place{steps.lattice, steps.voxel(n)};
         if (!visit(step, place)) return false;
       }
       return true;

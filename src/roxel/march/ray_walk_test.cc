@@ -212,7 +212,7 @@ TEST(RayWalk, SaysWhereAVoxelIs) {
     stack.walk(
         ray, {0, 10}, [](std::uint32_t) {},
         [&](const VoxelStep& step, const VoxelPlace& place) {
-          const Eigen::Vector3d cell = (place.centre(frame) - frame.origin) / frame.voxel_size;
+          const Eigen::Vector3d cell = (frame.voxel_centre(place.voxel) - frame.origin) / frame.voxel_size;
           EXPECT_EQ(volume.index(0).slot(cell.array().floor().cast<int>().matrix()), step.slot);
           return true;
         });
