@@ -7,7 +7,8 @@ target_compile_options(roxel_flags INTERFACE
   -Wall -Wextra -Wshadow -Wno-sign-compare -fno-math-errno -fno-trapping-math)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # GCC 12 sees overlaps and overruns in "a" + std::string.
-  target_compile_options(roxel_flags INTERFACE -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow)
+  target_compile_options(roxel_flags INTERFACE -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow
+    -Wno-stringop-overread)
 endif()
 if(ROXEL_SANITIZE)
   target_compile_options(roxel_flags INTERFACE -fsanitize=${ROXEL_SANITIZE} -fno-omit-frame-pointer)

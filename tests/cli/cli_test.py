@@ -211,6 +211,7 @@ CHANGES = {
     "bounds": ([], ["--bounds", "-1,-1,-1,1,1,1"]),
     "color-space": ([], ["--color-space", "hsv"]),
     "confidence-threshold": ([], ["--confidence-threshold", "0.5"]),
+    "draft-passes": ([], ["--draft-passes", "0"]),
     "evidence-half": ([], ["--evidence-half", "2"]),
     "far": ([], ["--far", "5"]),
     "filter-background": (BLACK, ["--filter-background"]),

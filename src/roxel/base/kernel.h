@@ -1,6 +1,6 @@
 #pragma once
-/// ROXEL_KERNEL marks inner loops that are compiled twice and chosen at load time where the compiler can: once
-/// for every x86-64, once for AVX2 and FMA.
+/// ROXEL_KERNEL marks inner loops that are compiled twice and chosen at load time where the compiler can:
+/// once for every x86-64, once for AVX2 and FMA.
 
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
@@ -8,4 +8,3 @@
 #else
 #define ROXEL_KERNEL
 #endif
-

@@ -89,8 +89,8 @@ class PixelDepthMarch {
     shares_.clear();
     RemovedColor removed;
     const Ray ray = region_ray(view, region);
-    const Segment whole = march_.march(view, region, sample, ray, view.plan.range, sight.at(x + 0.5, y + 0.5),
-                                       removed, steps_);
+    const Segment whole =
+        march_.march(view, region, sample, ray, view.plan.range, sight.at(x + 0.5, y + 0.5), removed, steps_);
     const float background = background_likelihood(pass_.opacity.background, pass_.opacity.model, sample);
     const float z = whole.likelihood + whole.transmittance * background;
     float transmittance = 1, total = 0, in_world = 0;
@@ -118,13 +118,9 @@ class PixelDepthMarch {
 
 }  // namespace
 
-std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& samples,
-                                     const SampleNode& views, const PassOptions& pass, const Totals& totals,
-                                     const DepthOptions& options, const RunContext& context,
-                                     NodeScratch& scratch) {
-  if (pass.predictive)
-    march_color(stack, samples, pass.opacity.model, pass.opacity.background, false, context, scratch);
-  scratch.compare_with(totals.color);
+std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& views,
+                                     const PassOptions& pass, const DepthOptions& options,
+                                     const RunContext& context, NodeScratch& scratch) {
   PixelDepthMarch march(stack, pass, options, scratch);
   std::vector<DepthMap> maps;
   for (const SampleView& view : views) {

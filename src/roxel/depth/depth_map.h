@@ -26,12 +26,10 @@ struct DepthOptions {
   bool likelihood = true;  ///< weigh by the posterior r_s; false: by a_s T_s, without looking at the image
 };
 
-/// The depth maps of a node's views at full resolution. `samples` are the node's views as the passes use them
-/// (for leaving the node out), `views` the same views with level 0 alone; `totals` the colours of all nodes.
-/// World variance includes s^2/12 for the voxel's extent.
-std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& samples,
-                                     const SampleNode& views, const PassOptions& pass, const Totals& totals,
-                                     const DepthOptions& options, const RunContext& context,
-                                     NodeScratch& scratch);
+/// The depth maps of a node's views at full resolution (level 0 alone). The scratch holds the colours to
+/// compare with (compare_with_others). World variance includes s^2/12 for the voxel's extent.
+std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& views,
+                                     const PassOptions& pass, const DepthOptions& options,
+                                     const RunContext& context, NodeScratch& scratch);
 
 }  // namespace roxel

@@ -52,7 +52,8 @@ class Sheets : public ::testing::Test {
     camera.intrinsics = {8, 8, 40, 40, 4, 4, 0};
     const SampleNode node{view_of(camera, plain_image(8, {color[0], color[1], color[2]}),
                                   plan_of({0.5, 5}, 0), {}, foreground)};
-    return estimate_depth(stack, node, node, pass_, totals, options, RunContext(1), scratch).front();
+    scratch.compare_with(totals.color);
+    return estimate_depth(stack, node, pass_, options, RunContext(1), scratch).front();
   }
 
   Volume volume_;
@@ -162,14 +163,17 @@ TEST_F(Sheets, PredictionLeavesTheNodesOwnColoursOut) {
   camera.intrinsics = {8, 8, 40, 40, 4, 4, 0};
   const SampleNode node{
       view_of(camera, plain_image(8, {kColor[0], kColor[1], kColor[2]}), plan_of({0.5, 5}, 0))};
-  Totals totals(volume_.slot_count());
-  collect_color(stack, {node}, pass_, RunContext(1), nullptr, totals);
-  const DepthMap alone = estimate_depth(stack, node, node, pass_, totals, {}, RunContext(1), scratch).front();
+  const std::vector<SampleNode> nodes{node};
+  const RunContext context(1);
+  CollectedColors collected(volume_.slot_count(), 1, 0);
+  collect_color(stack, nodes, pass_, context, nullptr, collected);
+  compare_with_others(stack, nodes, 0, pass_, collected, context, scratch);
+  const DepthMap alone = estimate_depth(stack, node, pass_, {}, context, scratch).front();
   EXPECT_NEAR(*alone.opacity.pixel(4, 4), 0.6, 5e-3);
   pass_.predictive = false;
   scratch.reset();
-  const DepthMap fooled =
-      estimate_depth(stack, node, node, pass_, totals, {}, RunContext(1), scratch).front();
+  compare_with_others(stack, nodes, 0, pass_, collected, context, scratch);
+  const DepthMap fooled = estimate_depth(stack, node, pass_, {}, context, scratch).front();
   EXPECT_GT(*fooled.opacity.pixel(4, 4), 0.99);
 }
 
@@ -189,13 +193,12 @@ TEST_F(Sheets, StopsWhenCancelled) {
   build({{7, 0.6}});
   const LatticeStack stack(volume_);
   NodeScratch scratch(stack, volume_.tau);
-  Totals totals(volume_.slot_count());
   RunContext context(1);
   context.cancel();
   PinholeCamera camera;
   camera.intrinsics = {8, 8, 40, 40, 4, 4, 0};
   const SampleNode node{view_of(camera, plain_image(8, {50, 0, 0}), plan_of({0.5, 5}, 0))};
-  EXPECT_THROW(estimate_depth(stack, node, node, pass_, totals, {}, context, scratch), Cancelled);
+  EXPECT_THROW(estimate_depth(stack, node, pass_, {}, context, scratch), Cancelled);
 }
 
 }  // namespace

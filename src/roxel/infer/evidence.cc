@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "roxel/base/error.h"
+#include "roxel/base/parallel.h"
 
 namespace roxel {
 
@@ -56,19 +57,71 @@ void NodeScratch::set_up_brick(std::uint32_t number) {
     VoxelScratch& voxel = voxels_[slot];
     voxel = VoxelScratch{};
     voxel.tau = tau_[slot];
-    if (totals_) color_of(totals_[slot], voxel.mean, voxel.cov, voxel.evidence);
+    if (totals_) look_up(slot, voxel);
   }
 }
 
-void NodeScratch::compare_with(const std::vector<ColorTotals>& totals) {
+void NodeScratch::look_up(std::uint32_t slot, VoxelScratch& voxel) const {
+  if (!colors_) return color_of(totals_[slot], voxel.mean, voxel.cov, voxel.evidence);
+  const VoxelColor& color = colors_[slot];
+  std::copy(color.mean, color.mean + 3, voxel.mean);
+  std::copy(color.cov, color.cov + 6, voxel.cov);
+  voxel.evidence = color.evidence;
+}
+
+OwnColors NodeScratch::own_colors() const {
+  OwnColors own;
+  std::size_t colored = 0;
+  for_each_entered_slot(*stack_, *this, [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t slot = begin; slot < end; ++slot) colored += voxels_[slot].evidence > 0;
+  });
+  own.entries.reserve(colored);
+  own.bricks.reserve(order_.size());
+  for (const std::uint32_t number : order_) {
+    const Brick& brick = stack_->brick(number);
+    const std::size_t before = own.entries.size();
+    for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count; ++slot) {
+      const VoxelScratch& voxel = voxels_[slot];
+      if (voxel.evidence <= 0) continue;
+      OwnColors::Entry entry{slot, {}, {}, voxel.evidence};
+      std::copy(voxel.mean, voxel.mean + 3, entry.mean);
+      std::copy(voxel.cov, voxel.cov + 6, entry.cov);
+      own.entries.push_back(entry);
+    }
+    if (own.entries.size() > before)
+      own.bricks.push_back({number, static_cast<std::uint32_t>(own.entries.size() - before)});
+  }
+  return own;
+}
+
+void NodeScratch::put_back(const OwnColors& own) {
+  const OwnColors::Entry* entry = own.entries.data();
+  for (const OwnColors::BrickPart& part : own.bricks) {
+    enter(part.brick);
+    for (std::uint32_t i = 0; i < part.count; ++i, ++entry) {
+      VoxelScratch& voxel = voxels_[entry->slot];
+      std::copy(entry->mean, entry->mean + 3, voxel.mean);
+      std::copy(entry->cov, entry->cov + 6, voxel.cov);
+      voxel.evidence = entry->evidence;
+    }
+  }
+}
+
+void NodeScratch::compare_with(const std::vector<ColorTotals>& totals,
+                               const std::vector<VoxelColor>* colors) {
   totals_ = totals.data();
+  colors_ = colors ? colors->data() : nullptr;
   for_each_entered_slot(*stack_, *this, [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
     for (std::uint32_t slot = begin; slot < end; ++slot) {
       VoxelScratch& voxel = voxels_[slot];
-      ColorTotals others = totals[slot];
-      const ColorTotals own = capped_color(voxel);
-      for (int c = 0; c < 10; ++c) others[c] -= own[c];
-      color_of(others, voxel.mean, voxel.cov, voxel.evidence);
+      if (voxel.evidence > 0) {
+        ColorTotals others = totals[slot];
+        const ColorTotals own = capped_color(voxel);
+        for (int c = 0; c < 10; ++c) others[c] -= own[c];
+        color_of(others, voxel.mean, voxel.cov, voxel.evidence);
+      } else {
+        look_up(slot, voxel);
+      }
       voxel.hits = voxel.exposure = voxel.looked = 0;
     }
   });
@@ -78,6 +131,7 @@ void NodeScratch::reset() {
   for (const std::uint32_t number : order_) entered_[number] = 0;
   order_.clear();
   totals_ = nullptr;
+  colors_ = nullptr;
 }
 
 ColorTotals capped_color(const VoxelScratch& voxel) {
@@ -156,6 +210,15 @@ void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& wei
   make_semi_definite(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + s[0] + s[1] + s[2], s);
   for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(m[c]);
   for (int c = 0; c < 6; ++c) cov[c] = static_cast<float>(s[c]);
+}
+
+std::vector<VoxelColor> colors_of(const std::vector<ColorTotals>& totals, int threads) {
+  std::vector<VoxelColor> colors(totals.size());
+  parallel_for_blocks(totals.size(), 1 << 14, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    for (std::int64_t slot = begin; slot < end; ++slot)
+      color_of(totals[slot], colors[slot].mean, colors[slot].cov, colors[slot].evidence);
+  });
+  return colors;
 }
 
 }  // namespace roxel

@@ -36,6 +36,32 @@ using ColorTotals = std::array<std::int64_t, 10>;
 /// Totals of one voxel's opacity evidence: hits, exposure, looked.
 using OpacityTotals = std::array<std::int64_t, 3>;
 
+/// Colour of a voxel as rays are compared with it.
+struct VoxelColor {
+  float mean[3] = {0, 0, 0};
+  float cov[6] = {0, 0, 0, 0, 0, 0};
+  float evidence = 0;
+};
+
+/// A node's own colour sums, kept between the two halves of a pass: the voxels that it coloured, brick by
+/// brick.
+struct OwnColors {
+  struct BrickPart {
+    std::uint32_t brick;
+    std::uint32_t count;  ///< of entries
+  };
+  struct Entry {
+    std::uint32_t slot;
+    float mean[3];
+    float cov[6];
+    float evidence;
+  };
+  std::vector<BrickPart> bricks;
+  std::vector<Entry> entries;
+
+  std::size_t bytes() const { return bricks.size() * sizeof(BrickPart) + entries.size() * sizeof(Entry); }
+};
+
 inline constexpr double kColorUnit = 1 << 24;
 inline constexpr double kOpacityUnit = 1 << 20;
 
@@ -53,17 +79,23 @@ class NodeScratch {
   }
   /// Turns all entered voxels from the node's own colour sums into what the *other* nodes say (the totals
   /// less the node's own, capped); bricks entered from now on get the totals, and opacity sums start at 0.
-  void compare_with(const std::vector<ColorTotals>& totals);
+  /// `colors` is color_of of all totals, when someone has it.
+  void compare_with(const std::vector<ColorTotals>& totals, const std::vector<VoxelColor>* colors = nullptr);
+  /// The node's own colour sums, to be put back into a scratch that has been reset.
+  OwnColors own_colors() const;
+  void put_back(const OwnColors& own);
   const std::vector<std::uint32_t>& entered_bricks() const { return order_; }
   /// Forgets the node.
   void reset();
 
  private:
   void set_up_brick(std::uint32_t brick);
+  void look_up(std::uint32_t slot, VoxelScratch& voxel) const;
 
   const LatticeStack* stack_;
   const float* tau_;
   const ColorTotals* totals_ = nullptr;
+  const VoxelColor* colors_ = nullptr;
   std::unique_ptr<VoxelScratch[]> voxels_;
   std::vector<std::uint8_t> entered_;
   std::vector<std::uint32_t> order_;
@@ -93,5 +125,6 @@ class Totals {
 
 /// Mean, covariance and weight of fixed-point colour sums; all zero without weight.
 void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& weight);
+std::vector<VoxelColor> colors_of(const std::vector<ColorTotals>& totals, int threads);
 
 }  // namespace roxel

@@ -83,8 +83,8 @@ class TwoVoxelRay : public ::testing::Test {
     RemovedColor removed;
     std::vector<EvaluatedStep> steps;
     const Region region{0, pixel_, pixel_};
-    march.march(view, region, view.pyramid->at(0, pixel_, pixel_), region_ray(view, region), plan.range, nullptr,
-                removed, steps);
+    march.march(view, region, view.pyramid->at(0, pixel_, pixel_), region_ray(view, region), plan.range,
+                nullptr, removed, steps);
     return steps;
   }
 

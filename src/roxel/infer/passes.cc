@@ -63,8 +63,8 @@ class ColorMarch {
   PassCounts counts;
 
  private:
-  static constexpr float kOpaque = 1e-4f;
-  static constexpr float kNothing = 1e-7f;  ///< weights that cannot matter against evidence of order 1
+  static constexpr float kOpaque = 1e-3f;
+  static constexpr float kNothing = 1e-6f;  ///< weights that cannot matter against evidence_half
 
   float deposit(const ViewInSight& in_sight, const Region& region, const RegionStats& sample, Stretch range,
                 float transmittance) {
@@ -78,8 +78,9 @@ class ColorMarch {
     second[3] = sample.cov[3] + sample.mean[0] * sample.mean[1];
     second[4] = sample.cov[4] + sample.mean[0] * sample.mean[2];
     second[5] = sample.cov[5] + sample.mean[1] * sample.mean[2];
-    ++counts.rays;
     const Eigen::Vector2d at = region_centre(view, region);
+    if (!in_sight.sight.any(at.x(), at.y())) return transmittance;
+    ++counts.rays;
     stack_.walk_chunks(
         view.camera.ray(at.x(), at.y()), range, in_sight.sight.at(at.x(), at.y()), chunk_,
         [&](std::uint32_t brick) { scratch_.enter(brick); },
@@ -175,9 +176,9 @@ class OpacityMarch {
     node.weight = observation_weight(view, region, sample);
     node.first_step = static_cast<std::uint32_t>(steps_.size());
     const Stretch range = served_range(view, region, begin);
-    if (range.end > range.begin) {
+    const Eigen::Vector2d at = region_centre(view, region);
+    if (range.end > range.begin && in_sight.sight.any(at.x(), at.y())) {
       ++counts.rays;
-      const Eigen::Vector2d at = region_centre(view, region);
       node.own = march_.march(view, region, sample, view.camera.ray(at.x(), at.y()), range,
                               in_sight.sight.at(at.x(), at.y()), removed, steps_);
     }

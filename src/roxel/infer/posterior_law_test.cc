@@ -19,11 +19,11 @@ class HeldColors {
         options_(options),
         stack_(volume_),
         scratch_(stack_, volume_.tau),
-        totals_(volume_.slot_count()) {
+        collected_(volume_.slot_count(), 1, 0) {
     PassOptions everywhere;
     everywhere.opacity = options;
     everywhere.everywhere = true;
-    collect_color(stack_, nodes_, everywhere, context_, nullptr, totals_);
+    collect_color(stack_, nodes_, everywhere, context_, nullptr, collected_);
   }
 
   /// Sums of the opacity pass at the current tau; returns the log-likelihood.
@@ -55,7 +55,8 @@ class HeldColors {
   OpacityPassOptions options_;
   LatticeStack stack_;
   NodeScratch scratch_;
-  Totals totals_;
+  CollectedColors collected_;
+  Totals& totals_ = collected_.totals;
   double weight_ = 0;
 };
 

@@ -30,8 +30,9 @@ struct OneView {
       : volume(std::move(v)), node{std::move(view)}, options(chosen) {
     PassOptions everywhere = options;
     everywhere.everywhere = true;
-    Totals totals(volume.slot_count());
-    collect_color(stack, {node}, everywhere, RunContext(1), nullptr, totals);
+    CollectedColors collected(volume.slot_count(), 1, 0);
+    collect_color(stack, {node}, everywhere, RunContext(1), nullptr, collected);
+    const Totals& totals = collected.totals;
     PassTwin coloured(volume, everywhere);
     coloured.collect_color({node});
     std::vector<TwinColor> colors;
@@ -259,7 +260,8 @@ TEST_F(Composition, StoppingEarlyLeavesOutLessThanItsBound) {
     scratch.compare_with(totals_);
     SegmentMarch march(stack, scratch, model_, background_, filters_);
     RemovedColor removed;
-    const Segment early = march.march(view_, {0, x, y}, sample, ray, view_.plan.range, nullptr, removed, some);
+    const Segment early =
+        march.march(view_, {0, x, y}, sample, ray, view_.plan.range, nullptr, removed, some);
     stopped += some.size() < all.size();
     // Likelihoods are at most 1 + outlier, so what lies behind adds at most T < kNegligible Z.
     ASSERT_LE(early.likelihood, whole.likelihood * (1 + 1e-6));

@@ -89,26 +89,61 @@ double log_prior(const Volume& volume, const std::vector<float>& prior_opacity, 
 
 PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode>& nodes,
                          const PassOptions& options, const RunContext& context, const PassProgress& progress,
-                         Totals& totals) {
-  totals.clear_color();
+                         CollectedColors& colors) {
+  colors.totals.clear_color();
   ScratchPool pool(stack, stack.volume().tau, context.thread_count());
-  return sum(for_each_node(nodes, context, progress, 0, 0.3, [&](const SampleNode& node, int worker) {
-    NodeScratch& scratch = pool.of(worker);
-    const PassCounts counts = march_color(stack, node, options.opacity.model, options.opacity.background,
-                                          options.everywhere, context, scratch);
-    totals.add_color(stack, scratch);
-    return counts;
-  }));
+  const PassCounts counts =
+      sum(for_each_node(nodes, context, progress, 0, 0.3, [&](const SampleNode& node, int worker) {
+        NodeScratch& scratch = pool.of(worker);
+        const PassCounts node_counts =
+            march_color(stack, node, options.opacity.model, options.opacity.background, options.everywhere,
+                        context, scratch);
+        colors.totals.add_color(stack, scratch);
+        if (options.predictive) colors.kept.keep(&node - nodes.data(), scratch);
+        return node_counts;
+      }));
+  colors.of_totals = colors_of(colors.totals.color, context.thread_count());
+  return counts;
+}
+
+void compare_with_others(const LatticeStack& stack, const std::vector<SampleNode>& nodes, std::size_t node,
+                         const PassOptions& options, const CollectedColors& colors, const RunContext& context,
+                         NodeScratch& scratch) {
+  if (options.predictive && !colors.kept.put_back(node, scratch))
+    march_color(stack, nodes[node], options.opacity.model, options.opacity.background, options.everywhere,
+                context, scratch);
+  scratch.compare_with(colors.totals.color, &colors.of_totals);
+}
+
+KeptColors::KeptColors(std::size_t node_count, std::size_t limit_bytes)
+    : left_bytes_(static_cast<std::int64_t>(limit_bytes)), nodes_(node_count) {}
+
+void KeptColors::keep(std::size_t node, const NodeScratch& scratch) {
+  if (left_bytes_ <= 0) return;
+  OwnColors own = scratch.own_colors();
+  const std::int64_t bytes = static_cast<std::int64_t>(own.bytes());
+  if (left_bytes_.fetch_sub(bytes) < bytes) {
+    left_bytes_ += bytes;
+    return;
+  }
+  nodes_[node] = std::make_unique<OwnColors>(std::move(own));
+}
+
+bool KeptColors::put_back(std::size_t node, NodeScratch& scratch) const {
+  if (!nodes_[node]) return false;
+  scratch.put_back(*nodes_[node]);
+  return true;
 }
 
 PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,
                     const RunContext& context, const PassProgress& progress, Volume& volume) {
   PassReport report;
   const LatticeStack stack(volume);
-  Totals totals(volume.slot_count());
+  CollectedColors colors(volume.slot_count(), nodes.size(), options.kept_color_bytes);
+  Totals& totals = colors.totals;
 
   auto start = Clock::now();
-  report.color = collect_color(stack, nodes, options, context, progress, totals);
+  report.color = collect_color(stack, nodes, options, context, progress, colors);
   report.color_seconds = seconds_since(start);
 
   start = Clock::now();
@@ -117,11 +152,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   report.opacity =
       sum(for_each_node(nodes, context, progress, 0.3, 1, [&](const SampleNode& node, int worker) {
         NodeScratch& scratch = pool.of(worker);
-        // The node's own colours once more, to leave them out of what its rays are compared with.
-        if (options.predictive)
-          march_color(stack, node, options.opacity.model, options.opacity.background, options.everywhere,
-                      context, scratch);
-        scratch.compare_with(totals.color);
+        compare_with_others(stack, nodes, &node - nodes.data(), options, colors, context, scratch);
         const double march_start = thread_seconds();
         const PassCounts counts = march_opacity(stack, node, options.opacity, context, scratch);
         march_seconds[worker] += thread_seconds() - march_start;
@@ -135,7 +166,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   report.prior_log_likelihood = log_prior(volume, field, options.prior.strength);
   report.update = update_opacity(options.opacity.rule, totals, field, options.prior.strength,
                                  context.thread_count(), volume);
-  update_color(totals, context.thread_count(), volume);
+  update_color(colors.of_totals, context.thread_count(), volume);
   return report;
 }
 

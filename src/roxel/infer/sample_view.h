@@ -15,6 +15,7 @@ struct SampleView {
   PinholeCamera camera;
   std::shared_ptr<const SamplePyramid> pyramid;
   SamplePlan plan;
+  SamplePlan draft_plan;  ///< the same with samples of twice the size, for passes that prepare others
   /// Observation weight of one pixel; a sample's weight is its usable area in pixels times this, so children
   /// share their parent's weight (docs/rays.md).
   float pixel_weight = 1;

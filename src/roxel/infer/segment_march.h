@@ -47,8 +47,9 @@ class SegmentMarch {
                const Background& background, const SampleFilters& filters)
       : stack_(stack), scratch_(scratch), model_(model), background_(background), filters_(filters) {}
 
-  /// Marches `ray` over `range` (cut to `sight` unless null, see walk_lattices), appends the steps, and returns (T, Z) from the range's begin, folded from
-  /// per-brick segments. Stops early once what lies behind can change Z by less than kNegligible of itself.
+  /// Marches `ray` over `range` (cut to `sight` unless null, see walk_lattices), appends the steps, and
+  /// returns (T, Z) from the range's begin, folded from per-brick segments. Stops early once what lies behind
+  /// can change Z by less than kNegligible of itself.
   Segment march(const SampleView& view, const Region& region, const RegionStats& sample, const Ray& ray,
                 Stretch range, const Stretch* sight, RemovedColor& removed,
                 std::vector<EvaluatedStep>& steps);
@@ -56,7 +57,7 @@ class SegmentMarch {
   /// Every step of the roxels rule counts, so its rays must not stop early.
   void set_early_stop(bool on) { early_stop_ = on; }
 
-  static constexpr float kNegligible = 1e-4f;
+  static constexpr float kNegligible = 1e-3f;
 
  private:
   bool flush(const SampleView& view, const Region& region, const RegionStats& sample, const StepChunk& chunk,

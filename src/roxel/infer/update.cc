@@ -101,12 +101,14 @@ UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::ve
   return {all.looked ? all.change / all.looked : 0, count ? all.opacity / count : 0};
 }
 
-void update_color(const Totals& totals, int threads, Volume& volume) {
+void update_color(const std::vector<VoxelColor>& colors, int threads, Volume& volume) {
   parallel_for_blocks(volume.slot_count(), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
     for (std::int64_t slot = begin; slot < end; ++slot) {
-      if (totals.color[slot][0] <= 0) continue;
-      color_of(totals.color[slot], volume.color_mean[slot].data(), volume.color_cov[slot].data(),
-               volume.color_weight[slot]);
+      const VoxelColor& color = colors[slot];
+      if (color.evidence <= 0) continue;
+      std::copy(color.mean, color.mean + 3, volume.color_mean[slot].begin());
+      std::copy(color.cov, color.cov + 6, volume.color_cov[slot].begin());
+      volume.color_weight[slot] = color.evidence;
     }
   });
 }

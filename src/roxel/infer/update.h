@@ -28,7 +28,7 @@ struct UpdateReport {
 UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::vector<float>& prior_opacity,
                             double prior_strength, int threads, Volume& volume);
 
-/// Sets the colour channels from the totals; voxels without evidence keep what they have.
-void update_color(const Totals& totals, int threads, Volume& volume);
+/// Sets the colour channels from colors_of the totals; voxels without evidence keep what they have.
+void update_color(const std::vector<VoxelColor>& colors, int threads, Volume& volume);
 
 }  // namespace roxel

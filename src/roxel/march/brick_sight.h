@@ -22,6 +22,11 @@ class BrickSight {
     const int y = std::min(static_cast<int>(v) / kTileSide, rows_ - 1);
     return &stretches_[static_cast<std::size_t>(y * columns_ + x) * lattices_];
   }
+  /// Whether the ray through (u, v) can meet anything at all.
+  bool any(double u, double v) const {
+    const Stretch* stretch = at(u, v);
+    return std::any_of(stretch, stretch + lattices_, [](const Stretch& s) { return s.end > s.begin; });
+  }
 
  private:
   void add_lattice(const BrickIndex& index, int lattice, const PinholeCamera& camera);

@@ -28,8 +28,8 @@ PinholeCamera random_camera(double distance, std::mt19937& random) {
       Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
   camera.pose.rotation = turn.toRotationMatrix();
   const Eigen::Vector3d aside(normal(random), normal(random), 0);
-  camera.pose.centre = -distance * camera.pose.rotation.row(2).transpose() +
-                       camera.pose.rotation.transpose() * aside;
+  camera.pose.centre =
+      -distance * camera.pose.rotation.row(2).transpose() + camera.pose.rotation.transpose() * aside;
   camera.intrinsics = {101, 67, 80, 85, 47, 36, 0.7};
   return camera;
 }
@@ -56,21 +56,23 @@ TEST_P(BrickSightTest, CutsNoVoxelAway) {
         const auto nothing = [](std::uint32_t) {};
         stack.walk_chunks(ray, range, nullptr, chunk, nothing, [&](const StepChunk& steps) {
           for (int i = 0; i < steps.count; ++i)
-            if (steps.length[i] > 1e-5f) expected.push_back(steps.slot[i]), lengths.push_back(steps.length[i]);
+            if (steps.length[i] > 1e-5f)
+              expected.push_back(steps.slot[i]), lengths.push_back(steps.length[i]);
           return true;
         });
         std::size_t same = 0;
-        stack.walk_chunks(ray, range, sight.at(x + 0.5, y + 0.5), chunk, nothing, [&](const StepChunk& steps) {
-          for (int i = 0; i < steps.count; ++i) {
-            if (steps.length[i] <= 1e-5f) continue;
-            slots.push_back(steps.slot[i]);
-            if (same < lengths.size()) {
-              EXPECT_NEAR(steps.length[i], lengths[same], 1e-5f);
-            }
-            ++same;
-          }
-          return true;
-        });
+        stack.walk_chunks(ray, range, sight.at(x + 0.5, y + 0.5), chunk, nothing,
+                          [&](const StepChunk& steps) {
+                            for (int i = 0; i < steps.count; ++i) {
+                              if (steps.length[i] <= 1e-5f) continue;
+                              slots.push_back(steps.slot[i]);
+                              if (same < lengths.size()) {
+                                EXPECT_NEAR(steps.length[i], lengths[same], 1e-5f);
+                              }
+                              ++same;
+                            }
+                            return true;
+                          });
         ASSERT_EQ(slots, expected);
         met += slots.size();
         for (int k = 0; k < 2; ++k) {

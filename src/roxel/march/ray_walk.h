@@ -76,12 +76,13 @@ inline int cell_index(CellCode code, int axis) {
 /// voxel_in_brick of the cell.
 inline int cell_in_brick(CellCode code) {
   using namespace internal;
-  return static_cast<int>((code & 7) | (code >> (kCellBits - 3) & 0x38) | (code >> (2 * kCellBits - 6) & 0x1c0));
+  return static_cast<int>((code & 7) | (code >> (kCellBits - 3) & 0x38) |
+                          (code >> (2 * kCellBits - 6) & 0x1c0));
 }
 
-/// Positions along a ray inside walk_cells are integers: 2^-28 voxel lengths from the ray's origin. All planes
-/// between cells lie at first + index * distance exactly, so the compares and adds of the walk's chain of
-/// dependent steps are short, and what is found in a cell does not depend on where the walk began.
+/// Positions along a ray inside walk_cells are integers: 2^-28 voxel lengths from the ray's origin. All
+/// planes between cells lie at first + index * distance exactly, so the compares and adds of the walk's chain
+/// of dependent steps are short, and what is found in a cell does not depend on where the walk began.
 inline constexpr double kWalkUnit = 1.0 / (1 << 28);
 
 /// What to do with a brick that a walk comes to.
@@ -146,8 +147,7 @@ inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame,
                      delta_z = std::abs(axes[2].distance);
   const CellCode step_x = static_cast<CellCode>(std::int64_t{axes[0].step}),
                  step_y = static_cast<CellCode>(std::int64_t{axes[1].step} * (1 << internal::kCellBits)),
-                 step_z =
-                     static_cast<CellCode>(axes[2].step * (std::int64_t{1} << 2 * internal::kCellBits));
+                 step_z = static_cast<CellCode>(axes[2].step * (std::int64_t{1} << 2 * internal::kCellBits));
 
   AtBrick what = enter(brick[0], brick[1], brick[2]);
   while (true) {
@@ -258,12 +258,12 @@ struct alignas(64) StepChunk {
   int count = 0;
   int lattice = 0;
   std::uint32_t slot[kSize];
-  float length[kSize];         ///< chord, in voxel lengths of the lattice
-  float weight[kSize];         ///< ray weight
+  float length[kSize];              ///< chord, in voxel lengths of the lattice
+  float weight[kSize];              ///< ray weight
   std::uint8_t brick_start[kSize];  ///< 1: first step in its brick, where segments break (docs/rays.md)
-  CellCode cell[kSize];        ///< the voxel in the lattice's frame
-  std::int64_t middle[kSize];  ///< twice the position of the chord's middle, in kWalkUnit
-  float depth_per_length;      ///< extent in depth of a chord of one voxel length
+  CellCode cell[kSize];             ///< the voxel in the lattice's frame
+  std::int64_t middle[kSize];       ///< twice the position of the chord's middle, in kWalkUnit
+  float depth_per_length;           ///< extent in depth of a chord of one voxel length
 
   /// Depth of the chord's middle.
   float depth(int i) const {
@@ -276,8 +276,8 @@ struct alignas(64) StepChunk {
  private:
   friend class LatticeStack;
   /// Fills `weight`: 1 - d / (sqrt(3)/2), d the distance of the ray's line from the voxel's centre: 1 through
-  /// the centre, 0 through a vertex. [Jethwa04] section 5.1.1. `direction` is the ray's unit direction, `near`
-  /// a point of it near the chunk, in voxels of the frame.
+  /// the centre, 0 through a vertex. [Jethwa04] section 5.1.1. `direction` is the ray's unit direction,
+  /// `near` a point of it near the chunk, in voxels of the frame.
   void set_weights(const float direction[3], const double near[3]);
   double depth_per_length_;
 };
@@ -324,9 +324,10 @@ class LatticeStack {
       const int nx = frame.size_in_bricks.x(), ny = frame.size_in_bricks.y();
       // A point of the ray near the stretch: relative to it floats do.
       const double middle = 0.5 * (stretch.begin + stretch.end);
-      const double near[3] = {(ray.origin.x() + middle * ray.direction.x() - frame.origin.x()) / frame.voxel_size,
-                              (ray.origin.y() + middle * ray.direction.y() - frame.origin.y()) / frame.voxel_size,
-                              (ray.origin.z() + middle * ray.direction.z() - frame.origin.z()) / frame.voxel_size};
+      const double near[3] = {
+          (ray.origin.x() + middle * ray.direction.x() - frame.origin.x()) / frame.voxel_size,
+          (ray.origin.y() + middle * ray.direction.y() - frame.origin.y()) / frame.voxel_size,
+          (ray.origin.z() + middle * ray.direction.z() - frame.origin.z()) / frame.voxel_size};
       const std::uint16_t* local = nullptr;
       std::uint32_t first_slot = 0;
       std::uint8_t starts_brick = 0;
@@ -351,7 +352,8 @@ class LatticeStack {
         on_brick(first_brick_[lattice] + static_cast<std::uint32_t>(found));
         return AtBrick::kVisit;
       };
-      const auto visit = [&](CellCode code, std::int64_t in, std::int64_t out) __attribute__((always_inline)) {
+      const auto visit = [&](CellCode code, std::int64_t in, std::int64_t out)
+          __attribute__((always_inline)) {
         // Written whether there is a voxel or not, counted if there is: cheaper than a branch that is
         // mispredicted at every surface.
         const std::uint16_t voxel = local[cell_in_brick(code)];

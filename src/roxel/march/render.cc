@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "roxel/base/parallel.h"
+#include "roxel/march/brick_sight.h"
 
 namespace roxel {
 
@@ -18,21 +19,25 @@ struct SeenAlongRay {
 };
 
 SeenAlongRay look(const LatticeStack& stack, const std::vector<std::array<float, 3>>& colors, const Ray& ray,
-                  Stretch range, bool surround) {
+                  Stretch range, const Stretch* sight, bool surround, StepChunk& chunk) {
   SeenAlongRay seen;
   const std::vector<float>& tau = stack.volume().tau;
   const auto nothing = [](std::uint32_t) {};
-  stack.walk(ray, range, nothing, [&](const VoxelStep& step, const VoxelPlace& place) {
-    if (place.lattice > 0 && !surround) return true;
-    const float a = -std::expm1(-tau[step.slot] * step.length);
-    const float r = a * seen.transmittance;
-    for (int c = 0; c < 3; ++c) seen.rgb[c] += r * colors[step.slot][c];
-    if (place.lattice == 0) {
-      seen.opacity += r;
-      seen.depth += r * step.depth;
+  stack.walk_chunks(ray, range, sight, chunk, nothing, [&](const StepChunk& steps) {
+    if (steps.lattice > 0 && !surround) return true;
+    for (int i = 0; i < steps.count; ++i) {
+      const std::uint32_t slot = steps.slot[i];
+      const float a = -std::expm1(-tau[slot] * steps.length[i]);
+      const float r = a * seen.transmittance;
+      for (int c = 0; c < 3; ++c) seen.rgb[c] += r * colors[slot][c];
+      if (steps.lattice == 0) {
+        seen.opacity += r;
+        seen.depth += r * steps.depth(i);
+      }
+      seen.transmittance *= 1 - a;
+      if (seen.transmittance <= kSpent) return false;
     }
-    seen.transmittance *= 1 - a;
-    return seen.transmittance > kSpent;
+    return true;
   });
   return seen;
 }
@@ -44,11 +49,15 @@ Rendering render(const LatticeStack& stack, const std::vector<std::array<float, 
                  const RunContext& context) {
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;
   Rendering out{Image(width, height, 3), Image(width, height, 1), Image(width, height, 1)};
+  const BrickSight sight(stack, camera);
   parallel_for(height, context.thread_count(), [&](std::int64_t row, int) {
     context.throw_if_cancelled();
     const int y = static_cast<int>(row);
+    StepChunk chunk;
     for (int x = 0; x < width; ++x) {
-      const SeenAlongRay seen = look(stack, colors, camera.ray(x + 0.5, y + 0.5), range, options.surround);
+      const double u = x + 0.5, v = y + 0.5;
+      const SeenAlongRay seen =
+          look(stack, colors, camera.ray(u, v), range, sight.at(u, v), options.surround, chunk);
       for (int c = 0; c < 3; ++c)
         out.rgb.pixel(x, y)[c] = seen.rgb[c] + seen.transmittance * options.background[c];
       *out.opacity.pixel(x, y) = seen.opacity;

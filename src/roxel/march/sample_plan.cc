@@ -22,6 +22,14 @@ Stretch depths_of(const PinholeCamera& camera, const Eigen::AlignedBox3d& box) {
 
 }  // namespace
 
+SamplePlan SamplePlan::coarser() const {
+  SamplePlan plan = *this;
+  ++plan.finest_level;
+  ++plan.root_level;
+  plan.serves_until_.insert(plan.serves_until_.begin(), 0.0);
+  return plan;
+}
+
 SamplePlan make_sample_plan(const PinholeCamera& camera, const Eigen::AlignedBox3d& box, double voxel_size,
                             Stretch range, const SamplePlanOptions& options) {
   const double focal = 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy);

@@ -29,6 +29,9 @@ struct SamplePlan {
     return level <= finest_level ? std::numeric_limits<double>::infinity() : serves_until_[level];
   }
   std::vector<double> serves_until_;
+
+  /// The plan whose samples are twice as wide at every depth, and so a quarter as many.
+  SamplePlan coarser() const;
 };
 
 /// The plan of one view for voxels of `voxel_size` inside `box`. `range` is cut to what can hold voxels by

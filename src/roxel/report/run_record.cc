@@ -66,6 +66,7 @@ ordered_json scene_json(const RunRecord& record) {
 ordered_json pass_json(const PassRecord& pass) {
   return {{"level", pass.level},
           {"pass", pass.pass},
+          {"draft", pass.draft},
           {"active_voxels", pass.active_voxels},
           {"rays", pass.rays},
           {"steps", pass.steps},

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "roxel/image/sample_pyramid.h"
+#include "roxel/infer/run_pass.h"
 #include "roxel/march/sample_plan.h"
 
 namespace roxel {
@@ -23,14 +24,16 @@ constexpr double kSurroundSteps = 8;         ///< more steps a ray for each surr
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
 // Nanoseconds on one core: a ray-voxel step of the colour and the opacity march, loading a pixel.
-constexpr double kColorStepNs = 55;
-constexpr double kOpacityStepNs = 55;
+constexpr double kColorStepNs = 60;  // with what is done once a voxel and node
+constexpr double kOpacityStepNs = 75;
 constexpr double kLoadPixelNs = 60;
+constexpr double kDraftCost = 0.45;  ///< of a pass on all samples
 
 // Bytes a voxel: channels of the volume, totals of a pass, and a worker's scratch.
 constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8;
-constexpr double kTotalsBytes = 80 + 24;
+constexpr double kTotalsBytes = 80 + 24 + 40;
 constexpr double kScratchBytes = 64;
+constexpr double kKeptShare = 0.35;  ///< of the voxels, for each node
 constexpr double kVoxelsPerBrick = 150;
 constexpr double kWritingBytesPerBrick = 36 * 1024;
 constexpr double kProgramBytes = 140e6;  ///< libraries
@@ -101,13 +104,17 @@ LevelEstimate estimate_level(const Scene& scene, double voxel_size, bool first_l
 }
 
 /// Resident memory while a level's passes run, or while the volume is written.
-double level_bytes(const LevelEstimate& level, const SampleLoad& load, double largest_image, int threads) {
+double level_bytes(const LevelEstimate& level, const SampleLoad& load, double largest_image, int nodes,
+                   int threads) {
   const double bricks = level.voxels / kVoxelsPerBrick;
   const double volume = level.voxels * kChannelBytes + bricks * sizeof(Brick);
   const double passing = level.voxels * (kTotalsBytes + kScratchBytes * threads) + load.bytes +
                          threads * largest_image * kResultBytesPerPixel;  // depth is last, beside the same
+  // What nodes say of the voxels they see is kept up to a limit (KeptColors).
+  const double kept = std::min(static_cast<double>(PassOptions().kept_color_bytes),
+                               kKeptShare * nodes * level.voxels * sizeof(OwnColors::Entry));
   const double loading = load.bytes + threads * largest_image * kDecodedBytesPerPixel;
-  return kProgramBytes + volume + std::max({passing, loading, bricks * kWritingBytesPerBrick});
+  return kProgramBytes + volume + std::max({passing + kept, loading, bricks * kWritingBytesPerBrick});
 }
 
 }  // namespace
@@ -125,10 +132,14 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
     const double voxel_size = std::ldexp(scene.voxel_size, options.levels - 1 - level);
     const SampleLoad load = sample_load(dataset, scene, voxel_size, options);
     const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays);
-    const double colour_marches = options.predictive ? 2 : 1;
+    const double colour_marches = options.predictive ? 1.5 : 1;  // most nodes' own colours are kept
     core_ns += all_pixels * kLoadPixelNs;
-    core_ns += options.passes * estimate.steps_per_pass * (colour_marches * kColorStepNs + kOpacityStepNs);
-    cost.memory_bytes = std::max(cost.memory_bytes, level_bytes(estimate, load, largest_image, threads));
+    const int drafts = std::min(options.draft_passes, options.passes - 1);
+    const double full_passes = options.passes - drafts * (1 - kDraftCost);
+    core_ns += full_passes * estimate.steps_per_pass * (colour_marches * kColorStepNs + kOpacityStepNs);
+    cost.memory_bytes =
+        std::max(cost.memory_bytes,
+                 level_bytes(estimate, load, largest_image, static_cast<int>(dataset.nodes.size()), threads));
     cost.levels.push_back(estimate);
   }
   // Depth and renders look along the ray of every pixel.

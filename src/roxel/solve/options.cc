@@ -38,6 +38,12 @@ void add_volume(OptionTable<Options>& table) {
       .help("Most passes a level")
       .range(1, 10000)
       .source("measured on plane and head");
+  table.add("draft-passes", &Options::draft_passes)
+      .help(
+          "First passes of a level that look at samples of twice the size, a quarter as many; the last pass "
+          "never does")
+      .range(0, 10000)
+      .source("measured on plane, head and dtu-scan24");
   table.add("tolerance", &Options::tolerance)
       .help("Mean change of opacity in a pass that ends a level")
       .range(0, 1);

@@ -24,6 +24,7 @@ struct ReconstructOptions {
   int resolution = 256;              ///< voxels along the longest side, at the finest level
   int levels = 3;
   int passes = 8;
+  int draft_passes = 5;  ///< of these, less one at most
   double tolerance = 1e-4;
   bool all_passes = false;
   SurroundChoice surround = SurroundChoice::kAuto;
@@ -54,7 +55,7 @@ struct ReconstructOptions {
   // Opacity
   UpdateRule update = UpdateRule::kPosterior;
   double spatial_prior = 0.95;
-  double prior_strength = 5;
+  double prior_strength = 3;
   double prior_opacity = 0.02;
   bool ray_weights = false;
   double opacity_threshold = 0.04;

@@ -40,10 +40,12 @@ class LevelProgress {
   double total_ = 0;
 };
 
-PassRecord make_record(int level, int pass, const Volume& volume, const PassReport& report, double seconds) {
+PassRecord make_record(int level, int pass, bool draft, const Volume& volume, const PassReport& report,
+                       double seconds) {
   PassRecord record;
   record.level = level;
   record.pass = pass;
+  record.draft = draft;
   record.active_voxels = volume.slot_count();
   record.rays = report.opacity.rays;
   record.steps = report.opacity.steps;
@@ -76,20 +78,26 @@ RefineOptions refine_options(const ReconstructOptions& options) {
   return refine;
 }
 
-/// Passes until the opacities rest or the limit is reached; returns whether they rest.
+/// Passes, the first of them drafts, until the opacities rest or the limit is reached; returns whether they
+/// rest.
 bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions& options, int level,
                 bool first_ever, const RunContext& context, LevelProgress& progress,
                 const ReconstructHooks& hooks, const Scene& scene, Volume& volume, Summary& summary) {
   PassOptions pass_opts = pass_options(scene, options);
+  const std::vector<SampleNode> drafts = drafts_of(samples);
+  int draft_passes = std::min(options.draft_passes, options.passes - 1);
   for (int pass = 1; pass <= options.passes; ++pass) {
     const auto start = Clock::now();
+    const bool draft = pass <= draft_passes;
     pass_opts.everywhere = first_ever && pass == 1;
     const PassReport report = run_pass(
-        samples, pass_opts, context, [&](double fraction) { progress.report(level, pass, fraction); },
-        volume);
-    summary.passes.push_back(make_record(level, pass, volume, report, seconds_since(start)));
+        draft ? drafts : samples, pass_opts, context,
+        [&](double fraction) { progress.report(level, pass, fraction); }, volume);
+    summary.passes.push_back(make_record(level, pass, draft, volume, report, seconds_since(start)));
     if (hooks.after_pass) hooks.after_pass(summary.passes.back());
-    if (!options.all_passes && report.update.mean_opacity_change < options.tolerance) return true;
+    if (options.all_passes || report.update.mean_opacity_change >= options.tolerance) continue;
+    if (!draft) return true;
+    draft_passes = pass;  // drafts say no more: on to the samples themselves
   }
   return false;
 }

@@ -22,12 +22,13 @@ class ViewStages {
         context_(context),
         stack_(reconstruction.volume),
         pass_(pass_options(scene_, options)),
-        totals_(stages.depth ? reconstruction.volume.slot_count() : 0),
+        collected_(stages.depth ? reconstruction.volume.slot_count() : 0, dataset.nodes.size(),
+                   pass_.kept_color_bytes),
         scratch_(context.thread_count()) {
     if (stages.render) colors_ = radiance_colors(reconstruction.volume, scene_.transform, scene_.exposure);
     if (!stages.depth) return;
     samples_ = make_samples(dataset, load, scene_, scene_.voxel_size, options, context);
-    collect_color(stack_, samples_, pass_, context, nullptr, totals_);
+    collect_color(stack_, samples_, pass_, context, nullptr, collected_);
   }
 
   void work_on_node(int node, int worker, const std::function<void(const ViewResult&)>& visit) {
@@ -58,8 +59,9 @@ class ViewStages {
       full.push_back(make_full_view(dataset_, result.view_idx, result.photo, scene_));
     if (!scratch_[worker]) scratch_[worker] = std::make_unique<NodeScratch>(stack_, stack_.volume().tau);
     scratch_[worker]->reset();
-    std::vector<DepthMap> maps = estimate_depth(stack_, samples_[node], full, pass_, totals_,
-                                                stages_.depth_options, context_, *scratch_[worker]);
+    compare_with_others(stack_, samples_, node, pass_, collected_, context_, *scratch_[worker]);
+    std::vector<DepthMap> maps =
+        estimate_depth(stack_, full, pass_, stages_.depth_options, context_, *scratch_[worker]);
     for (std::size_t i = 0; i < maps.size(); ++i) results[i].depth = std::move(maps[i]);
   }
 
@@ -85,7 +87,7 @@ class ViewStages {
   RunContext& context_;
   LatticeStack stack_;
   PassOptions pass_;
-  Totals totals_;
+  CollectedColors collected_;
   std::vector<SampleNode> samples_;
   std::vector<std::array<float, 3>> colors_;
   std::vector<std::unique_ptr<NodeScratch>> scratch_;

@@ -179,16 +179,23 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
     plan_options.adaptive = options.adaptive;
     view.plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size, view_range(scene, dataset, v),
                                  plan_options);
+    view.draft_plan = view.plan.coarser();
     const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
     view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
     const Photograph photo = load(dataset.views[v]);
     view.pyramid =
         std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground,
-                                        view.plan.finest_level, view.plan.root_level);
+                                        view.plan.finest_level, view.draft_plan.root_level);
   });
   std::vector<SampleNode> nodes(dataset.nodes.size());
   for (std::size_t v = 0; v < views.size(); ++v)
     nodes[dataset.views[v].node_idx].push_back(std::move(views[v]));
+  return nodes;
+}
+
+std::vector<SampleNode> drafts_of(std::vector<SampleNode> nodes) {
+  for (SampleNode& node : nodes)
+    for (SampleView& view : node) view.plan = view.draft_plan;
   return nodes;
 }
 

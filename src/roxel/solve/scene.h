@@ -34,6 +34,9 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
                                      double voxel_size, const ReconstructOptions& options,
                                      const RunContext& context);
 
+/// The same nodes with their draft plans as plans.
+std::vector<SampleNode> drafts_of(std::vector<SampleNode> nodes);
+
 /// One view in the matching space, all pixels: what depth and error maps are made from.
 SampleView make_full_view(const Dataset& dataset, int view_idx, const Photograph& photo, const Scene& scene);
 

@@ -8,8 +8,9 @@
 namespace roxel {
 
 struct PassRecord {
-  int level = 0;  ///< 1-based
-  int pass = 0;   ///< 1-based
+  int level = 0;       ///< 1-based
+  int pass = 0;        ///< 1-based
+  bool draft = false;  ///< on samples of twice the size
   std::int64_t active_voxels = 0;
   std::int64_t rays = 0;   ///< samples of the opacity march
   std::int64_t steps = 0;  ///< ray-voxel steps of the opacity march: existing voxels crossed
