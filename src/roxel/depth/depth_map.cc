@@ -85,6 +85,7 @@ class PixelDepthMarch {
     if (sample.valid <= 0) return {};
     // The depth is that of the ray through the pixel's centre: on the object where most of the pixel is.
     sample.foreground = sample.foreground >= 0.5f ? 1.0f : 0.0f;
+    if (sample.foreground == 0 && pass_.opacity.background.kind == BackgroundKind::kMask) return {};
     steps_.clear();
     shares_.clear();
     RemovedColor removed;

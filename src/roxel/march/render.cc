@@ -27,7 +27,7 @@ SeenAlongRay look(const LatticeStack& stack, const std::vector<std::array<float,
     if (steps.lattice > 0 && !surround) return true;
     for (int i = 0; i < steps.count; ++i) {
       const std::uint32_t slot = steps.slot[i];
-      const float a = -std::expm1(-tau[slot] * steps.length[i]);
+      const float a = 1 - std::exp(-tau[slot] * steps.length[i]);
       const float r = a * seen.transmittance;
       for (int c = 0; c < 3; ++c) seen.rgb[c] += r * colors[slot][c];
       if (steps.lattice == 0) {

@@ -55,7 +55,7 @@ struct ReconstructOptions {
   // Opacity
   UpdateRule update = UpdateRule::kPosterior;
   double spatial_prior = 0.95;
-  double prior_strength = 3;
+  double prior_strength = 5;
   double prior_opacity = 0.02;
   bool ray_weights = false;
   double opacity_threshold = 0.04;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <atomic>
 #include <chrono>
 #include <mutex>
@@ -77,6 +79,7 @@ TEST(Reconstruct, ASceneThatGoesOnEndsInTheSurround) {
   const Dataset dataset = cube_dataset(12, 36);
   ReconstructOptions options = cube_options();
   options.passes = 3;
+  options.draft_passes = 0;
   const PhotographLoader load = cube_loader(std::nullopt);
   RunContext context(2);
   const Reconstruction result = reconstruct(dataset, load, options, context);
@@ -142,6 +145,7 @@ TEST(Reconstruct, StopsALevelThatHasComeToRest) {
   ReconstructOptions options = cube_options();
   options.levels = 1;
   options.passes = 50;
+  options.draft_passes = 0;
   options.tolerance = 0.02;
   RunContext context(2);
   const Reconstruction result = reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
@@ -151,6 +155,35 @@ TEST(Reconstruct, StopsALevelThatHasComeToRest) {
   EXPECT_LT(result.summary.passes.back().mean_opacity_change, 0.02);
   for (std::size_t i = 0; i + 1 < result.summary.passes.size(); ++i)
     EXPECT_GE(result.summary.passes[i].mean_opacity_change, 0.02);
+}
+
+TEST(Reconstruct, DraftsThatHaveComeToRestAreFollowedByPassesOnAllSamples) {
+  ReconstructOptions options = cube_options();
+  options.levels = 1;
+  options.passes = 50;
+  options.draft_passes = 40;
+  options.tolerance = 0.02;
+  RunContext context(2);
+  const Reconstruction result = reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
+  const std::vector<PassRecord>& passes = result.summary.passes;
+  const auto first_full =
+      std::find_if(passes.begin(), passes.end(), [](const PassRecord& pass) { return !pass.draft; });
+  ASSERT_NE(first_full, passes.begin());
+  ASSERT_NE(first_full, passes.end());
+  EXPECT_LT(first_full - passes.begin(), 40);
+  EXPECT_LT((first_full - 1)->mean_opacity_change, 0.02);
+  EXPECT_TRUE(std::none_of(first_full, passes.end(), [](const PassRecord& pass) { return pass.draft; }));
+  EXPECT_GT(first_full->rays, 2 * passes.front().rays);
+  EXPECT_TRUE(result.summary.levels.back().converged);
+}
+
+TEST(Reconstruct, TheLastPassOfALevelIsNeverADraft) {
+  ReconstructOptions options = cube_options();
+  options.passes = 2;
+  options.draft_passes = 9;
+  RunContext context(2);
+  const Reconstruction result = reconstruct(cube_dataset(6, 24), cube_loader(), options, context);
+  for (const PassRecord& pass : result.summary.passes) EXPECT_EQ(pass.draft, pass.pass == 1);
 }
 
 TEST(Reconstruct, ReportsProgressFromZeroToItsShare) {
