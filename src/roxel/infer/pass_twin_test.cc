@@ -115,6 +115,38 @@ TEST(RunPass, EveryBackgroundIsItsSlowTwin) {
   }
 }
 
+// A node's own colours are kept, or marched for again: in any mixture, to the same bits.
+TEST(RunPass, KeepingOwnColorsChangesNoResult) {
+  std::mt19937 random(5);
+  const Volume start = random_volume({2, 2, 2}, 0.6, 0.01, 0.4, random);
+  const std::vector<SampleNode> nodes = nodes_around(start, 4, 24, 1, random);
+  const auto after = [&](std::size_t kept_bytes) {
+    Volume volume = start;
+    PassOptions options;
+    options.kept_color_bytes = kept_bytes;
+    run_pass(nodes, options, RunContext(2), nullptr, volume);
+    return volume;
+  };
+  CollectedColors collected(start.slot_count(), nodes.size(), std::size_t{1} << 30);
+  const LatticeStack stack(start);
+  collect_color(stack, nodes, PassOptions(), RunContext(1), nullptr, collected);
+  NodeScratch scratch(stack, start.tau);
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    scratch.reset();
+    ASSERT_TRUE(collected.kept.put_back(n, scratch));
+  }
+  const std::size_t one_node = scratch.own_colors().bytes();
+  ASSERT_GT(one_node, 1000u);
+  const Volume none = after(0);
+  EXPECT_NE(none.tau, start.tau);
+  for (const std::size_t bytes : {one_node + one_node / 2, std::size_t{1} << 30}) {
+    const Volume some = after(bytes);
+    EXPECT_EQ(some.tau, none.tau);
+    EXPECT_EQ(some.color_mean, none.color_mean);
+    EXPECT_EQ(some.color_cov, none.color_cov);
+  }
+}
+
 // Opaque volumes: rays stop early, so that what they leave out is below SegmentMarch::kNegligible of a ray.
 TEST(RunPass, OpaqueVolumesDifferByTheEarlyStopAtMost) {
   std::mt19937 random(10);
