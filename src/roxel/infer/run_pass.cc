@@ -68,7 +68,7 @@ std::vector<PassCounts> for_each_node(const std::vector<SampleNode>& nodes, cons
   std::atomic<int> done{0};
   parallel_for(nodes.size(), context.thread_count(), [&](std::int64_t i, int worker) {
     context.throw_if_cancelled();
-    counts[order[i]] = work(nodes[order[i]], worker);
+    counts[order[i]] = work(order[i], worker);
     if (progress) progress(from + (to - from) * (++done) / static_cast<double>(nodes.size()));
   });
   return counts;
@@ -92,16 +92,15 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
                          CollectedColors& colors) {
   colors.totals.clear_color();
   ScratchPool pool(stack, stack.volume().tau, context.thread_count());
-  const PassCounts counts =
-      sum(for_each_node(nodes, context, progress, 0, 0.3, [&](const SampleNode& node, int worker) {
-        NodeScratch& scratch = pool.of(worker);
-        const PassCounts node_counts =
-            march_color(stack, node, options.opacity.model, options.opacity.background, options.everywhere,
-                        context, scratch);
-        colors.totals.add_color(stack, scratch);
-        if (options.predictive) colors.kept.keep(&node - nodes.data(), scratch);
-        return node_counts;
-      }));
+  const PassCounts counts = sum(for_each_node(nodes, context, progress, 0, 0.3, [&](int node, int worker) {
+    NodeScratch& scratch = pool.of(worker);
+    const PassCounts node_counts =
+        march_color(stack, nodes[node], options.opacity.model, options.opacity.background, options.everywhere,
+                    context, scratch);
+    colors.totals.add_color(stack, scratch);
+    if (options.predictive) colors.kept.keep(node, scratch);
+    return node_counts;
+  }));
   colors.of_totals = colors_of(colors.totals.color, context.thread_count());
   return counts;
 }
@@ -149,16 +148,15 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   start = Clock::now();
   ScratchPool pool(stack, volume.tau, context.thread_count());
   std::vector<double> march_seconds(context.thread_count(), 0.0);
-  report.opacity =
-      sum(for_each_node(nodes, context, progress, 0.3, 1, [&](const SampleNode& node, int worker) {
-        NodeScratch& scratch = pool.of(worker);
-        compare_with_others(stack, nodes, &node - nodes.data(), options, colors, context, scratch);
-        const double march_start = thread_seconds();
-        const PassCounts counts = march_opacity(stack, node, options.opacity, context, scratch);
-        march_seconds[worker] += thread_seconds() - march_start;
-        totals.add_opacity(stack, scratch);
-        return counts;
-      }));
+  report.opacity = sum(for_each_node(nodes, context, progress, 0.3, 1, [&](int node, int worker) {
+    NodeScratch& scratch = pool.of(worker);
+    compare_with_others(stack, nodes, node, options, colors, context, scratch);
+    const double march_start = thread_seconds();
+    const PassCounts counts = march_opacity(stack, nodes[node], options.opacity, context, scratch);
+    march_seconds[worker] += thread_seconds() - march_start;
+    totals.add_opacity(stack, scratch);
+    return counts;
+  }));
   report.opacity_seconds = seconds_since(start);
   for (const double seconds : march_seconds) report.opacity_march_cpu_seconds += seconds;
 

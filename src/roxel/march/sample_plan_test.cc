@@ -108,5 +108,20 @@ TEST(SamplePlan, ACameraInTheBoxHasRootsAsLargeAsTheyMayBe) {
   EXPECT_EQ(plan.root_level, options.max_root_level);
 }
 
+TEST(SamplePlan, CoarserServesEveryDepthWithSamplesOfTwiceTheWidth) {
+  SamplePlan plan;
+  plan.finest_level = 1;
+  plan.root_level = 3;
+  plan.range = {0.5, 20};
+  plan.serves_until_ = {0, 8, 4, 2};
+  const SamplePlan coarser = plan.coarser();
+  EXPECT_EQ(coarser.finest_level, 2);
+  EXPECT_EQ(coarser.root_level, 4);
+  EXPECT_EQ(coarser.range.begin, 0.5);
+  EXPECT_EQ(coarser.range.end, 20);
+  for (int level = 1; level <= 3; ++level)
+    EXPECT_EQ(coarser.serves_until(level + 1), plan.serves_until(level));
+}
+
 }  // namespace
 }  // namespace roxel

@@ -141,14 +141,19 @@ TEST(Reconstruct, HalvesVoxelsFromLevelToLevel) {
   EXPECT_FALSE(result.summary.brief().empty());
 }
 
-TEST(Reconstruct, StopsALevelThatHasComeToRest) {
+/// One level of up to 50 passes that ends where a pass changes opacities by less than 0.02.
+Reconstruction run_to_rest(int draft_passes) {
   ReconstructOptions options = cube_options();
   options.levels = 1;
   options.passes = 50;
-  options.draft_passes = 0;
+  options.draft_passes = draft_passes;
   options.tolerance = 0.02;
   RunContext context(2);
-  const Reconstruction result = reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
+  return reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
+}
+
+TEST(Reconstruct, StopsALevelThatHasComeToRest) {
+  const Reconstruction result = run_to_rest(0);
   EXPECT_LT(result.summary.passes.size(), 50u);
   EXPECT_TRUE(result.summary.levels.back().converged);
   EXPECT_EQ(result.summary.termination, "converged");
@@ -158,13 +163,7 @@ TEST(Reconstruct, StopsALevelThatHasComeToRest) {
 }
 
 TEST(Reconstruct, DraftsThatHaveComeToRestAreFollowedByPassesOnAllSamples) {
-  ReconstructOptions options = cube_options();
-  options.levels = 1;
-  options.passes = 50;
-  options.draft_passes = 40;
-  options.tolerance = 0.02;
-  RunContext context(2);
-  const Reconstruction result = reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
+  const Reconstruction result = run_to_rest(40);
   const std::vector<PassRecord>& passes = result.summary.passes;
   const auto first_full =
       std::find_if(passes.begin(), passes.end(), [](const PassRecord& pass) { return !pass.draft; });
