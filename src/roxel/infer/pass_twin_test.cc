@@ -115,6 +115,29 @@ TEST(RunPass, EveryBackgroundIsItsSlowTwin) {
   }
 }
 
+// A sample at an outline colours voxels by the share of it that is object, one without object not at all.
+TEST(MarchColor, WeighsSamplesByTheirForeground) {
+  std::mt19937 random(6);
+  const Volume volume = random_volume({1, 1, 1}, 0.8, 0.05, 0.4, random);
+  const LatticeStack stack(volume);
+  const PinholeCamera camera = fixture::camera_at({4, 4, -16}, {4, 4, 4}, 12, 30);
+  const auto evidence = [&](std::uint8_t foreground) {
+    const SampleNode node{fixture::view_of(camera, fixture::plain_image(12, {50, 10, -10}),
+                                           fixture::plan_of({1, 60}, 0), {}, Mask(12, 12, foreground))};
+    NodeScratch scratch(stack, volume.tau);
+    march_color(stack, node, MatchModel(), Background(), false, RunContext(1), scratch);
+    double sum = 0;
+    for (const std::uint32_t brick : scratch.entered_bricks())
+      for (std::uint32_t v = 0; v < stack.brick(brick).count; ++v)
+        sum += scratch[stack.brick(brick).first_slot + v].evidence;
+    return sum;
+  };
+  const double full = evidence(255);
+  EXPECT_GT(full, 1);
+  EXPECT_NEAR(evidence(51), 0.2 * full, 1e-3 * full);
+  EXPECT_EQ(evidence(0), 0);
+}
+
 // A node's own colours are kept, or marched for again: in any mixture, to the same bits.
 TEST(RunPass, KeepingOwnColorsChangesNoResult) {
   std::mt19937 random(5);
