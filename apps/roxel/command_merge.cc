@@ -90,9 +90,10 @@ nlohmann::ordered_json merged_summary(const Invocation& invocation, const std::v
   return summary;
 }
 
-float ply_threshold(const MergeCommandOptions& options, const FinishedRun& run) {
-  const nlohmann::json& used = run.option("opacity-threshold");
-  return static_cast<float>(options.opacity_threshold.value_or(used.is_number() ? used.get<double>() : 0));
+/// What the run used for an option that is a number.
+float used_number(const FinishedRun& run, const char* option) {
+  const nlohmann::json& used = run.option(option);
+  return used.is_number() ? used.get<float>() : 0;
 }
 
 int run_merge(const Invocation& invocation, const MergeCommandOptions& options) {
@@ -109,8 +110,10 @@ int run_merge(const Invocation& invocation, const MergeCommandOptions& options) 
   remove_results(invocation.output);
   const VolumeInfo& info = runs.front().file.info;
   write_volume(invocation.output / "volume.vdb", merged, info, SavedLattices::kAll);
-  write_voxels_ply(invocation.output / "voxels.ply", merged, info.colors,
-                   ply_threshold(options, runs.front()));
+  write_voxels_ply(
+      invocation.output / "voxels.ply", merged, info.colors,
+      static_cast<float>(options.opacity_threshold.value_or(used_number(runs.front(), "opacity-threshold"))),
+      used_number(runs.front(), "confidence-threshold"));
   session.context().throw_if_cancelled();
   const std::string json = json_text(merged_summary(invocation, runs, merged));
   write_text_atomically(invocation.output / "summary.json", json + "\n");

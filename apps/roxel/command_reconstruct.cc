@@ -175,7 +175,8 @@ class Run {
                  options_.stages.save_surround ? SavedLattices::kAll : SavedLattices::kBoxOnly);
     session.context().throw_if_cancelled();
     write_voxels_ply(invocation_.output / "voxels.ply", made_.volume, made_.scene.transform,
-                     static_cast<float>(options_.reconstruct.opacity_threshold));
+                     static_cast<float>(options_.reconstruct.opacity_threshold),
+                     static_cast<float>(options_.reconstruct.confidence_threshold));
     session.context().throw_if_cancelled();
     made_.summary.stages.push_back({"write volume", stopwatch_.lap()});
     report(session, "writing", kVolumeWritten);

@@ -202,6 +202,7 @@ class Config(Case):
 BLACK = ["--masks", "none"]  # the demo's black background is then a known colour
 UNKNOWN = ["--masks", "none", "--background", "unknown"]
 CHANGES = {
+    "acceleration": ([], ["--acceleration", "1"]),
     "adaptive": (["--samples-per-voxel", "1"], ["--no-adaptive"]),
     "agreement": ([], ["--agreement", "linear"]),
     "agreement-scale": (["--agreement", "exponential"], ["--agreement-scale", "40"]),

@@ -344,7 +344,7 @@ double gamut_diameter(ColorSpace space) {
 }
 
 double default_noise(ColorSpace space) {
-  return 4 * std::cbrt(gamut_volume(space) / gamut_volume(ColorSpace::kLuv));
+  return 3 * std::cbrt(gamut_volume(space) / gamut_volume(ColorSpace::kLuv));
 }
 
 double unknown_color_likelihood(ColorSpace space, double noise) {

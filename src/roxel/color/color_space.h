@@ -98,14 +98,14 @@ double gamut_volume(ColorSpace space);
 /// two corners of the RGB cube. d_max of linear agreement.
 double gamut_diameter(ColorSpace space);
 
-/// Standard deviation per component of the noise that is always granted (Sigma_min = noise^2 I): 4 in luv;
+/// Standard deviation per component of the noise that is always granted (Sigma_min = noise^2 I): 3 in luv;
 /// elsewhere the deviation that is the same share of the gamut,
-/// 4 (gamut_volume(space) / gamut_volume(luv))^(1/3), so that "unknown colour" is worth the same in every
+/// 3 (gamut_volume(space) / gamut_volume(luv))^(1/3), so that "unknown colour" is worth the same in every
 /// space.
 double default_noise(ColorSpace space);
 
 /// Likelihood, relative to perfect agreement, of a colour about which nothing is known: uniform over the
-/// gamut, p = (2 pi)^(3/2) noise^3 / gamut_volume; 0.00076 for the default noise,
+/// gamut, p = (2 pi)^(3/2) noise^3 / gamut_volume; 0.00032 for the default noise,
 /// 0.0015 for 5 Luv units.
 double unknown_color_likelihood(ColorSpace space, double noise);
 

@@ -286,10 +286,10 @@ TEST(GamutDiameter, IsNotExceededByAnyPairAndIsReached) {
 }
 
 TEST(DefaultNoise, IsFourInLuvAndWorthTheSameEverywhere) {
-  EXPECT_DOUBLE_EQ(default_noise(ColorSpace::kLuv), 4);
-  const double p = unknown_color_likelihood(ColorSpace::kLuv, 4);
-  EXPECT_GT(p, 0.0005);
-  EXPECT_LT(p, 0.002);
+  EXPECT_DOUBLE_EQ(default_noise(ColorSpace::kLuv), 3);
+  const double p = unknown_color_likelihood(ColorSpace::kLuv, 3);
+  EXPECT_GT(p, 0.0002);
+  EXPECT_LT(p, 0.001);
   for (ColorSpace space : kSpaces)
     EXPECT_NEAR(unknown_color_likelihood(space, default_noise(space)), p, 1e-9) << to_string(space);
 }

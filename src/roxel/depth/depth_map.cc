@@ -1,6 +1,7 @@
 #include "roxel/depth/depth_map.h"
 
 #include <cmath>
+#include <optional>
 
 #include "roxel/march/brick_sight.h"
 
@@ -79,19 +80,19 @@ class PixelDepthMarch {
         box_slots_(stack.volume().box_slot_count()),
         march_(stack, scratch, pass.opacity.model, pass.opacity.background, pass.opacity.filters) {}
 
-  PixelDepth at(const SampleView& view, const BrickSight& sight, int x, int y) {
-    const Region region{0, x, y};
-    RegionStats sample = view.pyramid->at(0, x, y);
-    if (sample.valid <= 0) return {};
-    // The depth is that of the ray through the pixel's centre: on the object where most of the pixel is.
+  /// Whether the pixel's colour says that its ray, through its centre, ends in the box or may do so.
+  bool has_depth(const RegionStats& sample) const {
+    if (sample.valid <= 0) return false;
+    return sample.foreground >= 0.5f || pass_.opacity.background.kind != BackgroundKind::kMask;
+  }
+
+  PixelDepth at(const SampleView& view, RegionStats sample, const Ray& ray, const Stretch* sight, int x,
+                int y) {
     sample.foreground = sample.foreground >= 0.5f ? 1.0f : 0.0f;
-    if (sample.foreground == 0 && pass_.opacity.background.kind == BackgroundKind::kMask) return {};
     steps_.clear();
     shares_.clear();
     RemovedColor removed;
-    const Ray ray = region_ray(view, region);
-    const Segment whole =
-        march_.march(view, region, sample, ray, view.plan.range, sight.at(x + 0.5, y + 0.5), removed, steps_);
+    const Segment whole = march_.march(view, {0, x, y}, sample, ray, view.plan.range, sight, removed, steps_);
     const float background = background_likelihood(pass_.opacity.background, pass_.opacity.model, sample);
     const float z = whole.likelihood + whole.transmittance * background;
     float transmittance = 1, total = 0, in_world = 0;
@@ -108,6 +109,17 @@ class PixelDepthMarch {
     return summarise(shares_, total, in_world * in_world / 12, options_.estimate);
   }
 
+  /// What the ray of the last at() looks like.
+  RenderedRay rendered(const RenderBeside& render) const {
+    RenderedRay seen;
+    for (const EvaluatedStep& step : steps_) {
+      const bool in_box = step.slot < box_slots_;
+      if (in_box || render.options.surround)
+        seen.add(step.opacity, render.colors[step.slot], step.depth, in_box);
+    }
+    return seen;
+  }
+
  private:
   const PassOptions& pass_;
   const DepthOptions& options_;
@@ -119,27 +131,41 @@ class PixelDepthMarch {
 
 }  // namespace
 
-std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& views,
+std::vector<SeenView> estimate_depth(const LatticeStack& stack, const SampleNode& views,
                                      const PassOptions& pass, const DepthOptions& options,
-                                     const RunContext& context, NodeScratch& scratch) {
+                                     const RenderBeside* render, const RunContext& context,
+                                     NodeScratch& scratch) {
   PixelDepthMarch march(stack, pass, options, scratch);
-  std::vector<DepthMap> maps;
+  std::optional<RayRenderer> renderer;
+  if (render) renderer.emplace(stack, render->colors, render->options);
+  std::vector<SeenView> seen;
   for (const SampleView& view : views) {
     const int width = view.camera.intrinsics.width, height = view.camera.intrinsics.height;
     const BrickSight sight(stack, view.camera);
-    DepthMap map{Image(width, height, 1), Image(width, height, 1), Image(width, height, 1)};
+    SeenView out{{Image(width, height, 1), Image(width, height, 1), Image(width, height, 1)}, {}};
+    if (render) out.rendering = {Image(width, height, 3), Image(width, height, 1), Image(width, height, 1)};
     for (int y = 0; y < height; ++y) {
       context.throw_if_cancelled();
       for (int x = 0; x < width; ++x) {
-        const PixelDepth pixel = march.at(view, sight, x, y);
-        *map.depth.pixel(x, y) = pixel.depth;
-        *map.variance.pixel(x, y) = pixel.variance;
-        *map.opacity.pixel(x, y) = pixel.opacity;
+        const Ray ray = view.camera.ray(x + 0.5, y + 0.5);
+        const Stretch* ray_sight = sight.at(x + 0.5, y + 0.5);
+        const RegionStats sample = view.pyramid->at(0, x, y);
+        RenderedRay rendered;
+        if (march.has_depth(sample)) {
+          const PixelDepth pixel = march.at(view, sample, ray, ray_sight, x, y);
+          *out.depth.depth.pixel(x, y) = pixel.depth;
+          *out.depth.variance.pixel(x, y) = pixel.variance;
+          *out.depth.opacity.pixel(x, y) = pixel.opacity;
+          if (render) rendered = march.rendered(*render);
+        } else if (render) {
+          rendered = renderer->look(ray, view.plan.range, ray_sight);
+        }
+        if (render) rendered.write(render->options, x, y, out.rendering);
       }
     }
-    maps.push_back(std::move(map));
+    seen.push_back(std::move(out));
   }
-  return maps;
+  return seen;
 }
 
 }  // namespace roxel

@@ -3,6 +3,7 @@
 /// ([Jethwa04] section 6.2; docs/depth.md).
 
 #include "roxel/infer/run_pass.h"
+#include "roxel/march/render.h"
 
 namespace roxel {
 
@@ -26,10 +27,23 @@ struct DepthOptions {
   bool likelihood = true;  ///< weigh by the posterior r_s; false: by a_s T_s, without looking at the image
 };
 
-/// The depth maps of a node's views at full resolution (level 0 alone). The scratch holds the colours to
-/// compare with (compare_with_others). World variance includes s^2/12 for the voxel's extent.
-std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& views,
+/// For a rendering beside the depth map, from the same walk along each ray.
+struct RenderBeside {
+  const std::vector<std::array<float, 3>>& colors;  ///< linear RGB, one entry a slot
+  RenderOptions options;
+};
+
+struct SeenView {
+  DepthMap depth;
+  Rendering rendering;  ///< empty where none was asked for
+};
+
+/// The depth maps of a node's views at full resolution (level 0 alone), and with `render` what they look
+/// like. The scratch holds the colours to compare with (compare_with_others). World variance includes s^2/12
+/// for the voxel's extent.
+std::vector<SeenView> estimate_depth(const LatticeStack& stack, const SampleNode& views,
                                      const PassOptions& pass, const DepthOptions& options,
-                                     const RunContext& context, NodeScratch& scratch);
+                                     const RenderBeside* render, const RunContext& context,
+                                     NodeScratch& scratch);
 
 }  // namespace roxel

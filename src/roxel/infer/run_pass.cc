@@ -135,7 +135,8 @@ bool KeptColors::put_back(std::size_t node, NodeScratch& scratch) const {
 }
 
 PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,
-                    const RunContext& context, const PassProgress& progress, Volume& volume) {
+                    const RunContext& context, const PassProgress& progress, Volume& volume,
+                    Acceleration* acceleration) {
   PassReport report;
   const LatticeStack stack(volume);
   CollectedColors colors(volume.slot_count(), nodes.size(), options.kept_color_bytes);
@@ -163,7 +164,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   const std::vector<float> field = prior_opacity_field(volume, options.prior, context.thread_count());
   report.prior_log_likelihood = log_prior(volume, field, options.prior.strength);
   report.update = update_opacity(options.opacity.rule, totals, field, options.prior.strength,
-                                 context.thread_count(), volume);
+                                 context.thread_count(), volume, acceleration);
   update_color(colors.of_totals, context.thread_count(), volume);
   return report;
 }

@@ -31,7 +31,8 @@ using PassProgress = std::function<void(double fraction)>;
 /// Updates the volume. Nodes are worked on by whole workers in any order; totals are exact, so the result
 /// does not depend on the number of threads.
 PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,
-                    const RunContext& context, const PassProgress& progress, Volume& volume);
+                    const RunContext& context, const PassProgress& progress, Volume& volume,
+                    Acceleration* acceleration = nullptr);
 
 /// Own colours of as many nodes as fit into a limit: those need not be marched for again in the second half
 /// of a pass. What is kept may depend on the order of arrival; no result does.

@@ -61,7 +61,7 @@ std::vector<float> prior_opacity_field(const Volume& volume, const PriorOptions&
 }
 
 UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::vector<float>& prior_opacity,
-                            double prior_strength, int threads, Volume& volume) {
+                            double prior_strength, int threads, Volume& volume, Acceleration* acceleration) {
   struct Sums {
     double change = 0, opacity = 0;
     std::int64_t looked = 0;
@@ -79,6 +79,9 @@ UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::ve
       if (rule == UpdateRule::kPosterior) {
         const double weight = exposure + prior_strength;
         tau = weight > 0 ? (hits + prior_strength * prior_tau) / weight : prior_tau;
+        if (acceleration && weight > 0)
+          tau = (*acceleration)(static_cast<std::uint32_t>(slot), volume.tau[slot], tau,
+                                prior_strength / weight);
       } else {
         tau = hits > 1e-3 ? -std::log1p(-std::min(exposure / hits, 0.999999)) : prior_tau;
       }

@@ -1,6 +1,7 @@
 #pragma once
 /// From the evidence of all nodes to the volume: opacity under its prior, colour, confidence. docs/passes.md.
 
+#include "roxel/infer/acceleration.h"
 #include "roxel/infer/evidence.h"
 #include "roxel/infer/passes.h"
 
@@ -24,9 +25,10 @@ struct UpdateReport {
 
 /// Sets tau, confidence and support from the totals.
 /// Posterior: tau <- (hits + beta tau_0) / (exposure + beta). Roxels: alpha <- exposure / hits, alpha_0
-/// without hits.
+/// without hits. `acceleration`, unless null, lengthens posterior steps.
 UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::vector<float>& prior_opacity,
-                            double prior_strength, int threads, Volume& volume);
+                            double prior_strength, int threads, Volume& volume,
+                            Acceleration* acceleration = nullptr);
 
 /// Sets the colour channels from colors_of the totals; voxels without evidence keep what they have.
 void update_color(const std::vector<VoxelColor>& colors, int threads, Volume& volume);

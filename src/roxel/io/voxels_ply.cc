@@ -33,7 +33,8 @@ void append_row(const Eigen::Vector3d& centre, const float color[3], const Color
   rows.insert(rows.end(), row, row + kRowBytes);
 }
 
-std::vector<char> rows_of(const Volume& volume, const ColorTransform& colors, float opacity_threshold) {
+std::vector<char> rows_of(const Volume& volume, const ColorTransform& colors, float opacity_threshold,
+                          float confidence_threshold) {
   std::vector<char> rows;
   if (volume.lattice_count() == 0) return rows;
   const BrickIndex& index = volume.index(0);
@@ -42,7 +43,7 @@ std::vector<char> rows_of(const Volume& volume, const ColorTransform& colors, fl
       if (brick.local[v] == kNoVoxel) continue;
       const std::uint32_t slot = brick.first_slot + brick.local[v];
       const float alpha = alpha_from_tau(volume.tau[slot]);
-      if (!(alpha >= opacity_threshold)) continue;
+      if (!(alpha >= opacity_threshold && volume.confidence[slot] >= confidence_threshold)) continue;
       const Eigen::Vector3i in_brick(v % kBrickSide, v / kBrickSide % kBrickSide,
                                      v / (kBrickSide * kBrickSide));
       append_row(index.frame().voxel_centre(kBrickSide * brick.coord + in_brick),
@@ -54,8 +55,9 @@ std::vector<char> rows_of(const Volume& volume, const ColorTransform& colors, fl
 }  // namespace
 
 std::int64_t write_voxels_ply(const std::filesystem::path& path, const Volume& volume,
-                              const ColorTransform& colors, float opacity_threshold) {
-  const std::vector<char> rows = rows_of(volume, colors, opacity_threshold);
+                              const ColorTransform& colors, float opacity_threshold,
+                              float confidence_threshold) {
+  const std::vector<char> rows = rows_of(volume, colors, opacity_threshold, confidence_threshold);
   const std::int64_t count = static_cast<std::int64_t>(rows.size() / kRowBytes);
   write_file_atomically(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary);

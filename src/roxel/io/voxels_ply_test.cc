@@ -16,10 +16,12 @@ TEST(VoxelsPly, HoldsTheOpaqueVoxelsOfTheBoxAsPoints) {
   surround.insert({0, 0, 0});
   Volume volume({box, surround});
   volume.tau = {tau_from_alpha(0.9f), tau_from_alpha(0.1f), tau_from_alpha(0.5f), 16};
+  volume.confidence = {0.8f, 0.8f, 0.4f, 0.8f};
   volume.color_mean[0] = {1, 0, 2};         // brighter than white is clipped
   volume.color_mean[2] = {0.2140f, 0, -1};  // sRGB 0.5; below black is clipped
   const auto path = std::filesystem::path(testing::TempDir()) / "roxel_voxels.ply";
-  EXPECT_EQ(write_voxels_ply(path, volume, ColorTransform(ColorSpace::kRgb), 0.3f), 2);
+  EXPECT_EQ(write_voxels_ply(path, volume, ColorTransform(ColorSpace::kRgb), 0.3f, 0.5f), 1);
+  EXPECT_EQ(write_voxels_ply(path, volume, ColorTransform(ColorSpace::kRgb), 0.3f, 0.2f), 2);
 
   std::ifstream file(path, std::ios::binary);
   const std::string text((std::istreambuf_iterator<char>(file)), {});
@@ -51,7 +53,7 @@ TEST(VoxelsPly, HoldsTheOpaqueVoxelsOfTheBoxAsPoints) {
 
 TEST(VoxelsPly, AnEmptyVolumeIsAnEmptyCloud) {
   const auto path = std::filesystem::path(testing::TempDir()) / "roxel_no_voxels.ply";
-  EXPECT_EQ(write_voxels_ply(path, Volume(), ColorTransform(), 0.5f), 0);
+  EXPECT_EQ(write_voxels_ply(path, Volume(), ColorTransform(), 0.5f, 0), 0);
   EXPECT_TRUE(std::filesystem::exists(path));
   std::filesystem::remove(path);
 }

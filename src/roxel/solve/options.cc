@@ -91,7 +91,7 @@ void add_color(OptionTable<Options>& table) {
       .help("Standard deviation of colour that is always granted")
       .unit("units of the colour space")
       .above(0)
-      .unset("4 in Luv, the same share of the gamut elsewhere");
+      .unset("3 in Luv, the same share of the gamut elsewhere");
   table
       .add("agreement", &Options::agreement,
            {{"gaussian", Agreement::kGaussian},
@@ -151,20 +151,28 @@ void add_opacity(OptionTable<Options>& table) {
   table.add("prior-strength", &Options::prior_strength)
       .help("Weight of the prior")
       .unit("observations")
-      .at_least(0);
+      .at_least(0)
+      .source("measured on plane and head");
   table.add("prior-opacity", &Options::prior_opacity)
       .help("Opacity of a voxel about which nothing is known")
       .above(0)
       .below(1);
+  table.add("acceleration", &Options::acceleration)
+      .help(
+          "Longest step of an opacity, in times the pass's own, where passes keep going the same way; 1: "
+          "none")
+      .range(1, 100)
+      .source("docs/passes.md; measured on plane and head");
   table.add("ray-weights", &Options::ray_weights)
       .help("Weigh opacity sums, too, by how near a ray passes to the voxel's centre");
   table.add("opacity-threshold", &Options::opacity_threshold)
-      .help("Voxels below this opacity are dropped between levels")
+      .help("Voxels below this opacity are dropped between levels and left out of voxels.ply")
       .range(0, 0.999)
       .source("measured");
   table.add("confidence-threshold", &Options::confidence_threshold)
-      .help("Voxels below this confidence are dropped between levels and from the result")
-      .range(0, 0.999);
+      .help("Voxels below this confidence are dropped between levels and left out of voxels.ply")
+      .range(0, 0.999)
+      .source("measured on head and dtu-scan24");
 }
 
 OptionTable<Options> make_table() {

@@ -24,7 +24,7 @@ struct ReconstructOptions {
   int resolution = 256;              ///< voxels along the longest side, at the finest level
   int levels = 3;
   int passes = 8;
-  int draft_passes = 5;  ///< of these, less one at most
+  int draft_passes = 3;  ///< of these, less one at most
   double tolerance = 1e-4;
   bool all_passes = false;
   SurroundChoice surround = SurroundChoice::kAuto;
@@ -55,11 +55,12 @@ struct ReconstructOptions {
   // Opacity
   UpdateRule update = UpdateRule::kPosterior;
   double spatial_prior = 0.95;
-  double prior_strength = 5;
+  double prior_strength = 1.5;
   double prior_opacity = 0.02;
+  double acceleration = 12;
   bool ray_weights = false;
   double opacity_threshold = 0.04;
-  double confidence_threshold = 0;
+  double confidence_threshold = 0.001;
 };
 
 /// The one table that the command line, JSON, the summary and the docs are made from.

@@ -86,13 +86,18 @@ bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions
   PassOptions pass_opts = pass_options(scene, options);
   const std::vector<SampleNode> drafts = drafts_of(samples);
   int draft_passes = std::min(options.draft_passes, options.passes - 1);
+  // Before a background that may have any colour, whatever rises first hides what is behind it.
+  const Accelerate which =
+      scene.background.kind == BackgroundKind::kUnknown ? Accelerate::kFalling : Accelerate::kBoth;
+  Acceleration acceleration(volume.slot_count(), options.acceleration, which);
   for (int pass = 1; pass <= options.passes; ++pass) {
     const auto start = Clock::now();
     const bool draft = pass <= draft_passes;
     pass_opts.everywhere = first_ever && pass == 1;
     const PassReport report = run_pass(
         draft ? drafts : samples, pass_opts, context,
-        [&](double fraction) { progress.report(level, pass, fraction); }, volume);
+        [&](double fraction) { progress.report(level, pass, fraction); }, volume,
+        pass < options.passes ? &acceleration : nullptr);
     summary.passes.push_back(make_record(level, pass, draft, volume, report, seconds_since(start)));
     if (hooks.after_pass) hooks.after_pass(summary.passes.back());
     if (options.all_passes || report.update.mean_opacity_change >= options.tolerance) continue;

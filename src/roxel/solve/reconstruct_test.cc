@@ -152,6 +152,20 @@ Reconstruction run_to_rest(int draft_passes) {
   return reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
 }
 
+TEST(Reconstruct, AccelerationIsAheadOfPlainPasses) {
+  const auto likelihood = [](double acceleration, int passes) {
+    ReconstructOptions options = cube_options();
+    options.passes = passes;
+    options.acceleration = acceleration;
+    RunContext context(2);
+    const Dataset dataset = cube_dataset(8, 48);
+    const PhotographLoader load = cube_loader(std::array{0.0f, 0.0f, 0.0f}, true);
+    return reconstruct(dataset, load, options, context).summary.passes.back().mean_log_likelihood;
+  };
+  EXPECT_GT(likelihood(4, 8), likelihood(1, 8) + 0.01);
+  EXPECT_NEAR(likelihood(4, 16), likelihood(1, 16), 0.005);  // the same place in the end
+}
+
 TEST(Reconstruct, StopsALevelThatHasComeToRest) {
   const Reconstruction result = run_to_rest(0);
   EXPECT_LT(result.summary.passes.size(), 50u);

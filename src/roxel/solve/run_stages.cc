@@ -39,7 +39,7 @@ class ViewStages {
       for (std::size_t i = begin; i < end; ++i) load_view(views[i], results[i - begin]);
       if (stages_.depth) add_depth(node, worker, results);
       for (ViewResult& result : results) {
-        if (stages_.render) result.rendering = render_view(result.view_idx);
+        if (stages_.render && !stages_.depth) result.rendering = render_view(result.view_idx);
         visit(result);
         report_one();
       }
@@ -60,16 +60,25 @@ class ViewStages {
     if (!scratch_[worker]) scratch_[worker] = std::make_unique<NodeScratch>(stack_, stack_.volume().tau);
     scratch_[worker]->reset();
     compare_with_others(stack_, samples_, node, pass_, collected_, context_, *scratch_[worker]);
-    std::vector<DepthMap> maps =
-        estimate_depth(stack_, full, pass_, stages_.depth_options, context_, *scratch_[worker]);
-    for (std::size_t i = 0; i < maps.size(); ++i) results[i].depth = std::move(maps[i]);
+    const RenderBeside beside{colors_, render_options()};
+    std::vector<SeenView> seen =
+        estimate_depth(stack_, full, pass_, stages_.depth_options, stages_.render ? &beside : nullptr,
+                       context_, *scratch_[worker]);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      results[i].depth = std::move(seen[i].depth);
+      results[i].rendering = std::move(seen[i].rendering);
+    }
+  }
+
+  RenderOptions render_options() const {
+    RenderOptions options;
+    options.background = background_radiance(scene_);
+    return options;
   }
 
   Rendering render_view(int view_idx) const {
-    RenderOptions options;
-    options.background = background_radiance(scene_);
     return render(stack_, colors_, dataset_.views[view_idx].camera, view_range(scene_, dataset_, view_idx),
-                  options, context_);
+                  render_options(), context_);
   }
 
   void report_one() {
