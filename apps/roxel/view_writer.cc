@@ -78,7 +78,8 @@ ViewWriter::Pictures ViewWriter::make_pictures(const ViewResult& result) const {
   pictures.photo = encoded_picture(result.photo.rgb, white_, response_);
   if (!result.rendering.rgb.empty()) {
     pictures.render = encoded_picture(result.rendering.rgb, white_, response_);
-    pictures.error = error_picture(pictures.render, pictures.photo, result.photo.valid);
+    pictures.error =
+        error_picture(pictures.render, pictures.photo, result.photo.valid, result.photo.foreground);
   }
   const DepthMap& map = result.depth;
   if (!map.depth.empty())

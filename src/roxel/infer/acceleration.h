@@ -18,8 +18,8 @@ class Acceleration {
       : limit_(limit), which_(which), last_(limit > 1 ? slot_count : 0) {}
 
   /// Where to go from optical depth `before`, when EM says `em` (both >= 0). `prior_share` in [0, 1] is the
-  /// prior's share of `em`: where neighbours lead each other there is no room for long steps, so none is longer
-  /// than 1 + kPerEvidence (1 / prior_share - 1).
+  /// prior's share of `em`: where neighbours lead each other there is no room for long steps, so none is
+  /// longer than 1 + kPerEvidence (1 / prior_share - 1).
   double operator()(std::uint32_t slot, double before, double em, double prior_share);
 
  private:

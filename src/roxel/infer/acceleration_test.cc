@@ -68,7 +68,7 @@ TEST(Acceleration, AStepBackIsPlain) {
 
 TEST(Acceleration, ThePriorsShareBoundsIt) {
   Acceleration acceleration(2, 8);
-  EXPECT_NEAR(acceleration(0, 1.0, 1.5, 1.0), 1.5, 1e-6);  // all prior: plain EM
+  EXPECT_NEAR(acceleration(0, 1.0, 1.5, 1.0), 1.5, 1e-6);                            // all prior: plain EM
   EXPECT_NEAR(std::log(acceleration(1, 1.0, 1.5, 0.8)), 1.5 * std::log(1.5), 1e-6);  // 1 + 2 (1/0.8 - 1)
 }
 

@@ -106,16 +106,17 @@ Image depth_picture(const Image& depth, const Image& opacity, const ShownDepths&
   return picture;
 }
 
-Image error_picture(const Image& render, const Image& photo, const Mask& valid) {
+Image error_picture(const Image& render, const Image& photo, const Mask& valid, const Mask& foreground) {
   ROXEL_CHECK_EQ(render.width(), photo.width());
   ROXEL_CHECK_EQ(render.height(), photo.height());
   Image picture(render.width(), render.height(), 3);
   for (int y = 0; y < render.height(); ++y)
     for (int x = 0; x < render.width(); ++x) {
       if (!valid.empty() && valid.at(x, y) == 0) continue;
+      const float shown = foreground.empty() || foreground.at(x, y) >= 128 ? 1.0f : 0.0f;
       float squared = 0;
       for (int c = 0; c < 3; ++c) {
-        const float difference = render.pixel(x, y)[c] - photo.pixel(x, y)[c];
+        const float difference = render.pixel(x, y)[c] - shown * photo.pixel(x, y)[c];
         squared += difference * difference / 3;
       }
       const Color color = blend(kHeatColors, std::sqrt(squared) / kHottestError);

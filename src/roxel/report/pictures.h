@@ -29,8 +29,10 @@ Image depth_picture(const Image& depth, const Image& opacity, const ShownDepths&
 inline constexpr float kHottestError = 0.25f;
 
 /// Root mean square over the channels of the difference of two pictures as heat: black (none), violet, red,
-/// yellow, white (kHottestError and more). Black, too, where `valid` is 0.
-Image error_picture(const Image& render, const Image& photo, const Mask& valid);
+/// yellow, white (kHottestError and more). Black, too, where `valid` is 0. Where `foreground` (empty: all
+/// object) says that most of a pixel is not object, nothing should be seen, and the render is compared with
+/// black.
+Image error_picture(const Image& render, const Image& photo, const Mask& valid, const Mask& foreground);
 
 /// The picture at most `width` wide, averaged over areas; never enlarged.
 Image thumbnail(const Image& picture, int width);

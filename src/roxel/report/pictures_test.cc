@@ -72,14 +72,25 @@ TEST(ErrorPicture, IsBlackWithoutErrorAndWhiteAtTheHottest) {
   Image photo(3, 1, 3, 0.5f), render = photo;
   for (int c = 0; c < 3; ++c) render.pixel(1, 0)[c] = 0.5f + kHottestError / 2;
   for (int c = 0; c < 3; ++c) render.pixel(2, 0)[c] = 0.5f - kHottestError;
-  const Image heat = error_picture(render, photo, {});
+  const Image heat = error_picture(render, photo, {}, {});
   EXPECT_EQ(brightness(heat.pixel(0, 0)), 0);
   EXPECT_GT(brightness(heat.pixel(1, 0)), 0.5f);
   EXPECT_LT(brightness(heat.pixel(1, 0)), 2);
   EXPECT_NEAR(brightness(heat.pixel(2, 0)), 3, 1e-4);
   Mask valid(3, 1);
   valid.at(2, 0) = 0;
-  EXPECT_EQ(brightness(error_picture(render, photo, valid).pixel(2, 0)), 0);
+  EXPECT_EQ(brightness(error_picture(render, photo, valid, {}).pixel(2, 0)), 0);
+}
+
+TEST(ErrorPicture, OutsideTheObjectNothingShouldBeSeen) {
+  const Image photo(2, 1, 3, 0.8f);
+  Image render = photo;
+  for (int c = 0; c < 3; ++c) render.pixel(1, 0)[c] = 0;
+  Mask foreground(2, 1);
+  foreground.at(0, 0) = 0, foreground.at(1, 0) = 0;
+  const Image heat = error_picture(render, photo, {}, foreground);
+  EXPECT_NEAR(brightness(heat.pixel(0, 0)), 3, 1e-4);  // debris
+  EXPECT_EQ(brightness(heat.pixel(1, 0)), 0);
 }
 
 TEST(ErrorPicture, IsTheRootMeanSquareOverTheChannels) {
@@ -87,7 +98,7 @@ TEST(ErrorPicture, IsTheRootMeanSquareOverTheChannels) {
   Image one_channel = photo, all_channels = photo;
   one_channel.pixel(0, 0)[1] += 0.1f * std::sqrt(3.0f);
   for (int c = 0; c < 3; ++c) all_channels.pixel(0, 0)[c] += 0.1f;
-  const Image a = error_picture(one_channel, photo, {}), b = error_picture(all_channels, photo, {});
+  const Image a = error_picture(one_channel, photo, {}, {}), b = error_picture(all_channels, photo, {}, {});
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.pixel(0, 0)[c], b.pixel(0, 0)[c], 1e-4);
 }
 

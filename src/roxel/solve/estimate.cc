@@ -16,7 +16,7 @@ namespace {
 
 // Measured on plane, head, templeSparseRing and dtu-scan24 (with and without masks), at 64 to 256 voxels.
 constexpr double kSheetFactor = 3.6;
-constexpr double kCrossedShare = 0.43;
+constexpr double kCrossedShare = 0.2;
 constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
 constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level
 constexpr double kSurroundShare = 0.45;      ///< of the box's voxels, for each surround lattice
@@ -146,7 +146,7 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
   core_ns += all_pixels * (2 * kLoadPixelNs +
                            cost.levels.back().steps_per_pass /
                                std::max(1.0, sample_load(dataset, scene, scene.voxel_size, options).rays) *
-                               (2 * kColorStepNs + kOpacityStepNs));
+                               (kColorStepNs + kOpacityStepNs));
   cost.seconds = 1e-9 * core_ns / threads;
   return cost;
 }
