@@ -31,12 +31,12 @@ constexpr double kDraftCost = 0.45;  ///< of a pass on all samples
 
 // Bytes a voxel: channels of the volume, totals of a pass, and a worker's scratch.
 constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8;
-constexpr double kTotalsBytes = 80 + 24 + 40;
+constexpr double kTotalsBytes = 80 + 24 + 40 + 8;
 constexpr double kScratchBytes = 64;
-constexpr double kKeptShare = 0.35;  ///< of the voxels, for each node
+constexpr double kKeptShare = 0.6;  ///< of the voxels, for each node
 constexpr double kVoxelsPerBrick = 150;
 constexpr double kWritingBytesPerBrick = 36 * 1024;
-constexpr double kProgramBytes = 140e6;  ///< libraries
+constexpr double kProgramBytes = 200e6;  ///< libraries
 constexpr double kDecodedBytesPerPixel = 40;
 constexpr double kResultBytesPerPixel = 120;  ///< depth map, rendering, pictures
 
