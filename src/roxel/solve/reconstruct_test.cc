@@ -166,6 +166,23 @@ TEST(Reconstruct, AccelerationIsAheadOfPlainPasses) {
   EXPECT_NEAR(likelihood(4, 16), likelihood(1, 16), 0.005);  // the same place in the end
 }
 
+TEST(Reconstruct, CamerasInTheBoxHurryOnlyWhatFalls) {
+  const auto first_pass_opacity = [](double acceleration) {
+    ReconstructOptions options = cube_options();
+    options.bounds = {-6, -6, -6, 6, 6, 6};
+    options.resolution = 24;
+    options.levels = 1;
+    options.passes = 2;  // the last is never hurried
+    options.acceleration = acceleration;
+    RunContext context(2);
+    const Dataset dataset = cube_dataset(6, 32);
+    for (const View& view : dataset.views) EXPECT_LT(view.camera.pose.centre.cwiseAbs().maxCoeff(), 6);
+    const PhotographLoader load = cube_loader(std::array{0.0f, 0.0f, 0.0f}, true);
+    return reconstruct(dataset, load, options, context).summary.passes.front().mean_opacity;
+  };
+  EXPECT_LT(first_pass_opacity(12), first_pass_opacity(1));
+}
+
 TEST(Reconstruct, StopsALevelThatHasComeToRest) {
   const Reconstruction result = run_to_rest(0);
   EXPECT_LT(result.summary.passes.size(), 50u);
