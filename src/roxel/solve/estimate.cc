@@ -16,6 +16,7 @@ namespace {
 
 // Measured on plane, head, templeSparseRing and dtu-scan24 (with and without masks), at 64 to 256 voxels.
 constexpr double kSheetFactor = 3.6;
+constexpr double kInsideFactor = 1.7;  ///< times that, around cameras that stand in the box (courtyard)
 constexpr double kCrossedShare = 0.2;
 constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
 constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level
@@ -79,21 +80,22 @@ struct BoxVoxels {
   double crossed = 0;
 };
 
-BoxVoxels box_voxels(const Eigen::Vector3d& cells, bool first_level) {
+BoxVoxels box_voxels(const Eigen::Vector3d& cells, bool first_level, double sheet_factor) {
   const double all = cells.prod();
   const double mean_side = cells.mean();
   const double cross_section = (cells.x() * cells.y() + cells.y() * cells.z() + cells.z() * cells.x()) / 3;
   if (first_level) return {all, kCrossedShare * mean_side};
-  const double behind_each_other = kSheetFactor * std::sqrt(mean_side);
+  const double behind_each_other = sheet_factor * std::sqrt(mean_side);
   const double count = std::min(kFilledShare * all, cross_section * behind_each_other);
   return {count, kCrossedShare * std::min(behind_each_other, mean_side)};
 }
 
-LevelEstimate estimate_level(const Scene& scene, double voxel_size, bool first_level, double rays) {
+LevelEstimate estimate_level(const Scene& scene, double voxel_size, bool first_level, double rays,
+                             double sheet_factor) {
   const Eigen::Vector3d cells =
       nested_frames(scene.bounds.box, voxel_size, scene.surround_count)[0].size_in_voxels().cast<double>();
   const Eigen::Vector3d used = first_level ? cells : Eigen::Vector3d(scene.bounds.box.sizes() / voxel_size);
-  const BoxVoxels box = box_voxels(used, first_level);
+  const BoxVoxels box = box_voxels(used, first_level, sheet_factor);
   LevelEstimate level;
   level.voxel_size = voxel_size;
   const double per_lattice =
@@ -126,12 +128,16 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
     all_pixels += pixel_count(view);
     largest_image = std::max(largest_image, pixel_count(view));
   }
+  const bool from_inside = std::any_of(dataset.views.begin(), dataset.views.end(), [&](const View& view) {
+    return scene.bounds.box.contains(view.camera.pose.centre);
+  });
+  const double sheet_factor = kSheetFactor * (from_inside ? kInsideFactor : 1);
   CostEstimate cost;
   double core_ns = all_pixels * kLoadPixelNs;  // survey
   for (int level = 0; level < options.levels; ++level) {
     const double voxel_size = std::ldexp(scene.voxel_size, options.levels - 1 - level);
     const SampleLoad load = sample_load(dataset, scene, voxel_size, options);
-    const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays);
+    const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays, sheet_factor);
     const double colour_marches = options.predictive ? 1.5 : 1;  // most nodes' own colours are kept
     core_ns += all_pixels * kLoadPixelNs;
     const int drafts = std::min(options.draft_passes, options.passes - 1);
