@@ -128,10 +128,7 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
     all_pixels += pixel_count(view);
     largest_image = std::max(largest_image, pixel_count(view));
   }
-  const bool from_inside = std::any_of(dataset.views.begin(), dataset.views.end(), [&](const View& view) {
-    return scene.bounds.box.contains(view.camera.pose.centre);
-  });
-  const double sheet_factor = kSheetFactor * (from_inside ? kInsideFactor : 1);
+  const double sheet_factor = kSheetFactor * (scene.seen_from_inside ? kInsideFactor : 1);
   CostEstimate cost;
   double core_ns = all_pixels * kLoadPixelNs;  // survey
   for (int level = 0; level < options.levels; ++level) {

@@ -1,6 +1,5 @@
 #include "roxel/solve/reconstruct.h"
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -81,15 +80,9 @@ RefineOptions refine_options(const ReconstructOptions& options) {
 
 /// Before a background that may have any colour, and before a camera inside the box, whatever rises first
 /// hides what is behind it: there, only falling opacities are hurried.
-Accelerate which_steps(const Scene& scene, const std::vector<SampleNode>& samples) {
-  const auto inside_box = [&](const SampleView& view) {
-    return scene.bounds.box.contains(view.camera.pose.centre);
-  };
-  const bool from_inside = std::any_of(samples.begin(), samples.end(), [&](const SampleNode& node) {
-    return std::any_of(node.begin(), node.end(), inside_box);
-  });
-  return scene.background.kind == BackgroundKind::kUnknown || from_inside ? Accelerate::kFalling
-                                                                          : Accelerate::kBoth;
+Accelerate which_steps(const Scene& scene) {
+  const bool open = scene.background.kind == BackgroundKind::kUnknown || scene.seen_from_inside;
+  return open ? Accelerate::kFalling : Accelerate::kBoth;
 }
 
 /// Passes, the first of them drafts, until the opacities rest or the limit is reached; returns whether they
@@ -100,7 +93,7 @@ bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions
   PassOptions pass_opts = pass_options(scene, options);
   const std::vector<SampleNode> drafts = drafts_of(samples);
   int draft_passes = std::min(options.draft_passes, options.passes - 1);
-  Acceleration acceleration(volume.slot_count(), options.acceleration, which_steps(scene, samples));
+  Acceleration acceleration(volume.slot_count(), options.acceleration, which_steps(scene));
   for (int pass = 1; pass <= options.passes; ++pass) {
     const auto start = Clock::now();
     const bool draft = pass <= draft_passes;

@@ -108,6 +108,9 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
     if (!tightened.isApprox(scene.bounds.box)) scene.bounds.how += "; tightened by masks";
     scene.bounds.box = tightened;
   }
+  scene.seen_from_inside = std::any_of(dataset.views.begin(), dataset.views.end(), [&](const View& view) {
+    return scene.bounds.box.contains(view.camera.pose.centre);
+  });
   const double longest = scene.bounds.box.sizes().maxCoeff();
   scene.voxel_size = options.voxel_size.value_or(longest / options.resolution);
   if (longest / scene.voxel_size > 65536)

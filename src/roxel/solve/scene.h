@@ -9,10 +9,11 @@ namespace roxel {
 
 struct Scene {
   SceneBounds bounds;
-  double voxel_size = 0;     ///< finest level, world units
-  int surround_count = 0;    ///< lattices around the box
-  ColorTransform transform;  ///< linear RGB / exposure <-> matching space
-  double exposure = 1;       ///< radiance that counts as display white; 1 for 8- and 16-bit images
+  double voxel_size = 0;          ///< finest level, world units
+  int surround_count = 0;         ///< lattices around the box
+  bool seen_from_inside = false;  ///< a camera stands in the box
+  ColorTransform transform;       ///< linear RGB / exposure <-> matching space
+  double exposure = 1;            ///< radiance that counts as display white; 1 for 8- and 16-bit images
   MatchModel model;
   Background background;
   std::vector<std::string> notes;  ///< what was chosen and why, for people
