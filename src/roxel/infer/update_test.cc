@@ -196,5 +196,18 @@ TEST(UpdateColor, SetsWhatIsSeenAndKeepsTheRest) {
   EXPECT_FLOAT_EQ(row.volume.color_weight[1], 3);
 }
 
+// Two voxels on their way up from the same opacity: one that only its prior moves, one that only rays move.
+TEST(UpdateOpacity, HurriesWhatRaysMoveAndNotWhatThePriorMoves) {
+  Row row(2);
+  row.volume.tau = {0.1f, 0.1f};
+  row.set(0, 0, 0, 0);
+  row.set(1, 200, 1000, 1);
+  Acceleration acceleration(2, 8);
+  const float prior = static_cast<float>(-std::expm1(-0.2));
+  update_opacity(UpdateRule::kPosterior, row.totals, {prior, prior}, 1e-3, 1, row.volume, &acceleration);
+  EXPECT_NEAR(row.volume.tau[0], 0.2, 1e-5);  // EM's step
+  EXPECT_NEAR(row.volume.tau[1], 0.4, 1e-5);  // twice as long, in log tau
+}
+
 }  // namespace
 }  // namespace roxel

@@ -165,6 +165,19 @@ TEST(Reconstruct, AccelerationIsAheadOfPlainPasses) {
   EXPECT_NEAR(likelihood(4, 16), likelihood(1, 16), 0.005);  // the same place in the end
 }
 
+// What a run leaves is an EM step: the sums that merge adds up again.
+TEST(Reconstruct, TheLastPassOfALevelIsPlain) {
+  const auto only_pass = [](double acceleration) {
+    ReconstructOptions options = cube_options();
+    options.levels = 1;
+    options.passes = 1;
+    options.acceleration = acceleration;
+    RunContext context(2);
+    return reconstruct(cube_dataset(6, 24), cube_loader(), options, context).volume.tau;
+  };
+  EXPECT_EQ(only_pass(12), only_pass(1));
+}
+
 TEST(Reconstruct, CamerasInTheBoxHurryOnlyWhatFalls) {
   const auto first_pass_opacity = [](double acceleration) {
     ReconstructOptions options = cube_options();
