@@ -78,7 +78,9 @@ class PixelDepthMarch {
       : pass_(pass),
         options_(options),
         box_slots_(stack.volume().box_slot_count()),
-        march_(stack, scratch, pass.opacity.model, pass.opacity.background, pass.opacity.filters) {}
+        march_(stack, scratch, pass.opacity.model, pass.opacity.background, pass.opacity.filters) {
+    march_.set_depths(true);
+  }
 
   /// Whether the pixel's colour says that its ray, through its centre, ends in the box or may do so.
   bool has_depth(const RegionStats& sample) const {
@@ -96,15 +98,17 @@ class PixelDepthMarch {
     const float background = background_likelihood(pass_.opacity.background, pass_.opacity.model, sample);
     const float z = whole.likelihood + whole.transmittance * background;
     float transmittance = 1, total = 0, in_world = 0;
-    for (const EvaluatedStep& step : steps_) {
+    for (std::size_t i = 0; i < steps_.size(); ++i) {
+      const EvaluatedStep step = steps_[i];
       const float prior = transmittance * step.opacity;
       transmittance *= 1 - step.opacity;
       if (step.slot >= box_slots_) continue;
       const float r = options_.likelihood ? (z > 0 ? prior * step.likelihood / z : 0) : prior;
       const float into_chord = step.length > 0 ? step.mean_path / step.length : 0.5f;
-      shares_.push_back({r, step.depth + (2 * into_chord - 1) * step.half_chord, step.half_chord});
+      const StepDepth chord = steps_.depth(i);
+      shares_.push_back({r, chord.middle + (2 * into_chord - 1) * chord.half_chord, chord.half_chord});
       total += r;
-      in_world = step.length > 0 ? 2 * step.half_chord / step.length : in_world;
+      in_world = step.length > 0 ? 2 * chord.half_chord / step.length : in_world;
     }
     return summarise(shares_, total, in_world * in_world / 12, options_.estimate);
   }
@@ -112,10 +116,11 @@ class PixelDepthMarch {
   /// What the ray of the last at() looks like.
   RenderedRay rendered(const RenderBeside& render) const {
     RenderedRay seen;
-    for (const EvaluatedStep& step : steps_) {
+    for (std::size_t i = 0; i < steps_.size(); ++i) {
+      const EvaluatedStep step = steps_[i];
       const bool in_box = step.slot < box_slots_;
       if (in_box || render.options.surround)
-        seen.add(step.opacity, render.colors[step.slot], step.depth, in_box);
+        seen.add(step.opacity, render.colors[step.slot], steps_.depth(i).middle, in_box);
     }
     return seen;
   }
@@ -125,7 +130,7 @@ class PixelDepthMarch {
   const DepthOptions& options_;
   std::uint32_t box_slots_;
   SegmentMarch march_;
-  std::vector<EvaluatedStep> steps_;
+  EvaluatedSteps steps_;
   std::vector<Share> shares_;
 };
 

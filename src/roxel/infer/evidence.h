@@ -72,6 +72,7 @@ class NodeScratch {
 
   VoxelScratch& operator[](std::uint32_t slot) { return voxels_[slot]; }
   const VoxelScratch& operator[](std::uint32_t slot) const { return voxels_[slot]; }
+  const VoxelScratch* voxels() const { return voxels_.get(); }
   /// Sets up the brick's voxels if this node has not been here before: their tau, no sums, and the colours of
   /// compare_with, if any.
   void enter(std::uint32_t brick) {

@@ -65,7 +65,7 @@ class TwoVoxelRay : public ::testing::Test {
     model_.outlier = 0;
   }
 
-  std::vector<EvaluatedStep> march(const Image& image, const SamplePlan& plan = plan_of({1, 100}, 0)) {
+  EvaluatedSteps march(const Image& image, const SamplePlan& plan = plan_of({1, 100}, 0)) {
     const SampleView view = view_of(camera_, image, plan);
     const LatticeStack stack(volume_);
     NodeScratch scratch(stack, volume_.tau);
@@ -81,7 +81,7 @@ class TwoVoxelRay : public ::testing::Test {
     scratch.compare_with(totals);
     SegmentMarch march(stack, scratch, model_, background_, filters_);
     RemovedColor removed;
-    std::vector<EvaluatedStep> steps;
+    EvaluatedSteps steps;
     const Region region{0, pixel_, pixel_};
     march.march(view, region, view.pyramid->at(0, pixel_, pixel_), region_ray(view, region), plan.range,
                 nullptr, removed, steps);
@@ -112,9 +112,9 @@ Image image_of(const Eigen::Vector3d& color) {
 
 TEST_F(TwoVoxelRay, FilterRaysRemovesWhatTheFirstVoxelExplains) {
   const Eigen::Vector3d seen = kOpacity[0] * colors_[0] + (1 - kOpacity[0]) * colors_[1];
-  const std::vector<EvaluatedStep> plain = march(image_of(seen));
+  const EvaluatedSteps plain = march(image_of(seen));
   filters_.rays = true;
-  const std::vector<EvaluatedStep> filtered = march(image_of(seen));
+  const EvaluatedSteps filtered = march(image_of(seen));
   ASSERT_EQ(plain.size(), 2u);
   ASSERT_EQ(filtered.size(), 2u);
   const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
@@ -130,7 +130,7 @@ TEST_F(TwoVoxelRay, FilterRaysRemovesWhatTheFirstVoxelExplains) {
 
 TEST_F(TwoVoxelRay, FilterRaysStopsAtItsLimit) {
   const Eigen::Vector3d seen = kOpacity[0] * colors_[0] + (1 - kOpacity[0]) * colors_[1];
-  const std::vector<EvaluatedStep> plain = march(image_of(seen));
+  const EvaluatedSteps plain = march(image_of(seen));
   filters_.rays = true;
   filters_.limit = 0.3f;  // below the first voxel's 0.4
   EXPECT_EQ(march(image_of(seen))[1].likelihood, plain[1].likelihood);
@@ -143,9 +143,9 @@ TEST_F(TwoVoxelRay, FilterBackgroundRemovesItsShare) {
   background_.cov[0] = background_.cov[1] = background_.cov[2] = 2;
   const double share = (1 - kOpacity[0]) * (1 - kOpacity[1]);
   const Eigen::Vector3d seen = share * black + (1 - share) * colors_[1];
-  const std::vector<EvaluatedStep> plain = march(image_of(seen));
+  const EvaluatedSteps plain = march(image_of(seen));
   filters_.background = true;
-  const std::vector<EvaluatedStep> filtered = march(image_of(seen));
+  const EvaluatedSteps filtered = march(image_of(seen));
   const double spread = share * share * 2 / ((1 - share) * (1 - share));
   for (int i = 0; i < 2; ++i) {
     EXPECT_NEAR(plain[i].likelihood, agreement_with(i, seen, Eigen::Matrix3d::Zero()), 1e-5);
@@ -156,7 +156,7 @@ TEST_F(TwoVoxelRay, FilterBackgroundRemovesItsShare) {
 }
 
 TEST_F(TwoVoxelRay, FilterBackgroundNeedsAKnownBackground) {
-  const std::vector<EvaluatedStep> plain = march(image_of(colors_[0]));
+  const EvaluatedSteps plain = march(image_of(colors_[0]));
   filters_.background = true;
   background_.kind = BackgroundKind::kUnknown;
   EXPECT_EQ(march(image_of(colors_[0]))[0].likelihood, plain[0].likelihood);
@@ -173,9 +173,9 @@ TEST_F(TwoVoxelRay, InterpolateComparesTheColourAtTheVoxelsCentre) {
       ramp.pixel(x, y)[0] = 50 + 12.0f * x;
       ramp.pixel(x, y)[1] = -10 + 9.0f * y;
     }
-  const std::vector<EvaluatedStep> plain = march(ramp);
+  const EvaluatedSteps plain = march(ramp);
   filters_.interpolate = true;
-  const std::vector<EvaluatedStep> interpolated = march(ramp);
+  const EvaluatedSteps interpolated = march(ramp);
   ASSERT_EQ(interpolated.size(), 2u);
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector3d centre(i == 0 ? 2.5 : 5.5, 4.5, 4.5);

@@ -63,7 +63,9 @@ inline __attribute__((always_inline)) void evaluate_with(const Function& agreeme
   const float s3 = sample.cov_plus_noise[3], s4 = sample.cov_plus_noise[4], s5 = sample.cov_plus_noise[5];
   const float foreground = sample.foreground, outlier = model.outlier;
   const float half = model.evidence_half, uninformative = model.uninformative;
-  for (int i = 0; i < count; ++i) {
+  // Whole eighths: what lies behind the count is computed and left unread.
+  const int padded = (count + 7) / 8 * 8;
+  for (int i = 0; i < padded; ++i) {
     const float x = block.tau[i] * block.length[i];
     const float a = one_minus_exp(x);
     block.opacity[i] = a;

@@ -63,12 +63,15 @@ class ColorMarch {
   PassCounts counts;
 
  private:
-  static constexpr float kOpaque = 1e-3f;
+  static constexpr float kOpaque = 3e-4f;
   static constexpr float kNothing = 1e-6f;  ///< weights that cannot matter against evidence_half
 
   float deposit(const ViewInSight& in_sight, const Region& region, const RegionStats& sample, Stretch range,
                 float transmittance) {
     const SampleView& view = in_sight.view;
+    const Eigen::Vector2d at = region_centre(view, region);
+    const Stretch* sight = in_sight.sight.within(at.x(), at.y(), range);
+    if (!sight) return transmittance;
     const float weight =
         observation_weight(view, region, sample) * sample.foreground *
         (1 - (background_.kind == BackgroundKind::kKnown ? known_background_share(background_, model_, sample)
@@ -78,11 +81,9 @@ class ColorMarch {
     second[3] = sample.cov[3] + sample.mean[0] * sample.mean[1];
     second[4] = sample.cov[4] + sample.mean[0] * sample.mean[2];
     second[5] = sample.cov[5] + sample.mean[1] * sample.mean[2];
-    const Eigen::Vector2d at = region_centre(view, region);
-    if (!in_sight.sight.any(at.x(), at.y())) return transmittance;
     ++counts.rays;
     stack_.walk_chunks(
-        view.camera.ray(at.x(), at.y()), range, in_sight.sight.at(at.x(), at.y()), chunk_,
+        view.camera.ray(at.x(), at.y()), range, sight, chunk_,
         [&](std::uint32_t brick) { scratch_.enter(brick); },
         [&](const StepChunk& chunk) {
           counts.steps += chunk.count;
@@ -123,16 +124,12 @@ class ColorMarch {
 /// One sample of the tree that a root sample divides into: its own stretch of steps and what its children
 /// add.
 struct TreeNode {
-  Region region;
   std::uint32_t first_step = 0;
   std::uint32_t end_step = 0;
-  Segment own;
   float weight = 0;         ///< observation weight
-  float background = 0;     ///< p_bg, for leaves
   float behind = 0;         ///< leaves: p_bg; inner: product of Z_c^{share}
-  float z = 0;              ///< own.Z + own.T * behind
-  float agreement_sum = 0;  ///< roxels: of this stretch; and with the best leaf path behind it
-  float best_path_sum = 0;
+  float z = 0;              ///< of its own stretch and what is behind it
+  float best_path_sum = 0;  ///< roxels: agreements of its stretch and of the best leaf path behind it
   int children[4] = {-1, -1, -1, -1};
 };
 
@@ -170,52 +167,67 @@ class OpacityMarch {
     const RegionStats sample = view.pyramid->at(region.level, region.x, region.y);
     if (sample.valid <= 0) return -1;
     const int self = static_cast<int>(tree_.size());
-    tree_.push_back({});
-    TreeNode node;
-    node.region = region;
-    node.weight = observation_weight(view, region, sample);
-    node.first_step = static_cast<std::uint32_t>(steps_.size());
+    const std::uint32_t first_step = static_cast<std::uint32_t>(steps_.size());
+    tree_.emplace_back();
     const Stretch range = served_range(view, region, begin);
     const Eigen::Vector2d at = region_centre(view, region);
-    if (range.end > range.begin && in_sight.sight.any(at.x(), at.y())) {
+    const Stretch* sight = range.end > range.begin ? in_sight.sight.within(at.x(), at.y(), range) : nullptr;
+    Segment own;
+    if (sight) {
       ++counts.rays;
-      node.own = march_.march(view, region, sample, view.camera.ray(at.x(), at.y()), range,
-                              in_sight.sight.at(at.x(), at.y()), removed, steps_);
+      own =
+          march_.march(view, region, sample, view.camera.ray(at.x(), at.y()), range, sight, removed, steps_);
     }
-    node.end_step = static_cast<std::uint32_t>(steps_.size());
-    counts.steps += node.end_step - node.first_step;
-    for (std::uint32_t s = node.first_step; s < node.end_step; ++s)
-      node.agreement_sum += steps_[s].likelihood;
+    const std::uint32_t end_step = static_cast<std::uint32_t>(steps_.size());
+    counts.steps += end_step - first_step;
 
     const bool ends = range.end >= view.plan.range.end || region.level == view.plan.finest_level;
     const bool spent = options_.rule == UpdateRule::kPosterior &&
-                       node.own.transmittance < SegmentMarch::kNegligible * node.own.likelihood;
-    if (!ends && !spent) add_children(in_sight, std::max(range.begin, range.end), removed, node);
-    if (ends || spent || node.behind <= 0) {
-      node.background = background_likelihood(options_.background, options_.model, sample);
-      if (ends || spent) node.behind = node.background;
-      node.best_path_sum = std::max(node.best_path_sum, node.background);
+                       own.transmittance < SegmentMarch::kNegligible * own.likelihood;
+    Behind behind;
+    if (!ends && !spent)
+      behind = add_children(in_sight, region, std::max(range.begin, range.end), removed, self);
+    float background = 0;
+    if (ends || spent || behind.z <= 0) {
+      background = background_likelihood(options_.background, options_.model, sample);
+      if (ends || spent) behind.z = background;
+      behind.best_path_sum = std::max(behind.best_path_sum, background);
     }
-    node.best_path_sum += node.agreement_sum;
-    node.z = node.own.likelihood + node.own.transmittance * node.behind;
-    tree_[self] = node;
+    TreeNode& node = tree_[self];
+    node.first_step = first_step;
+    node.end_step = end_step;
+    node.weight = observation_weight(view, region, sample);
+    node.behind = behind.z;
+    node.z = own.likelihood + own.transmittance * behind.z;
+    node.best_path_sum = behind.best_path_sum;
+    if (options_.rule == UpdateRule::kRoxels)
+      for (std::uint32_t s = first_step; s < end_step; ++s) node.best_path_sum += steps_.likelihood(s);
     return self;
   }
 
+  /// What a sample's children say of what lies behind its stretch.
+  struct Behind {
+    float z = 0;              ///< prod Z_c^{share}
+    float best_path_sum = 0;  ///< roxels: of agreements, along the best leaf path
+  };
+
   /// The four children are quarter-weight observations of what lies behind: behind = prod Z_c^{share}.
-  void add_children(const ViewInSight& in_sight, double begin, const RemovedColor& removed, TreeNode& node) {
+  Behind add_children(const ViewInSight& in_sight, const Region& region, double begin,
+                      const RemovedColor& removed, int parent) {
+    Behind behind;
     float total = 0, log_sum = 0;
     for (int c = 0; c < 4; ++c) {
-      const Region child = node.region.child(c);
+      const Region child = region.child(c);
       if (!inside(in_sight.view, child)) continue;
       const int index = build(in_sight, child, begin, removed);
-      node.children[c] = index;
+      tree_[parent].children[c] = index;
       if (index < 0) continue;
       total += tree_[index].weight;
       log_sum += tree_[index].weight * std::log(std::max(tree_[index].z, 1e-30f));
-      node.best_path_sum = std::max(node.best_path_sum, tree_[index].best_path_sum);
+      behind.best_path_sum = std::max(behind.best_path_sum, tree_[index].best_path_sum);
     }
-    if (total > 0) node.behind = std::exp(log_sum / total);
+    if (total > 0) behind.z = std::exp(log_sum / total);
+    return behind;
   }
 
   /// Gives out probability `reach` (of the ray getting as far as this sample's stretch) to its voxels and
@@ -226,7 +238,7 @@ class OpacityMarch {
     const float scale = reach / node.z;
     float transmittance = 1, remaining = reach;
     for (std::uint32_t s = node.first_step; s < node.end_step; ++s) {
-      const EvaluatedStep& step = steps_[s];
+      const EvaluatedStep step = steps_[s];
       const float r = std::min(scale * transmittance * step.opacity * step.likelihood, remaining);
       VoxelScratch& voxel = scratch_[step.slot];
       const float w = options_.ray_weights ? node.weight * step.weight : node.weight;
@@ -246,7 +258,7 @@ class OpacityMarch {
   void distribute_roxels(int index, float path_sum, float explained) {
     const TreeNode& node = tree_[index];
     for (std::uint32_t s = node.first_step; s < node.end_step; ++s) {
-      const EvaluatedStep& step = steps_[s];
+      const EvaluatedStep step = steps_[s];
       const float r = step.likelihood / path_sum;
       const float alpha = std::min(r / std::max(1 - explained, 1e-6f), 1.0f);
       VoxelScratch& voxel = scratch_[step.slot];
@@ -264,7 +276,7 @@ class OpacityMarch {
   NodeScratch& scratch_;
   SegmentMarch march_;
   std::vector<TreeNode> tree_;
-  std::vector<EvaluatedStep> steps_;
+  EvaluatedSteps steps_;
 };
 
 }  // namespace

@@ -171,17 +171,18 @@ class Composition : public ::testing::Test {
     view_ = view_of(camera, random_image(16, random_), plan_of({1, 80}, 0));
   }
 
-  Segment march(const Ray& ray, const RegionStats& sample, Stretch range, std::vector<EvaluatedStep>& steps) {
+  Segment march(const Ray& ray, const RegionStats& sample, Stretch range, EvaluatedSteps& steps) {
     return march(volume_, totals_, ray, sample, range, steps);
   }
 
   Segment march(const Volume& volume, const std::vector<ColorTotals>& totals, const Ray& ray,
-                const RegionStats& sample, Stretch range, std::vector<EvaluatedStep>& steps) {
+                const RegionStats& sample, Stretch range, EvaluatedSteps& steps) {
     const LatticeStack stack(volume);
     NodeScratch scratch(stack, volume.tau);
     scratch.compare_with(totals);
     SegmentMarch march(stack, scratch, model_, background_, filters_);
     march.set_early_stop(false);
+    march.set_depths(true);
     RemovedColor removed;
     return march.march(view_, {0, 0, 0}, sample, ray, range, nullptr, removed, steps);
   }
@@ -204,7 +205,8 @@ TEST_F(Composition, CutAtBrickPlanesARayIsTheSameBitForBit) {
     const int x = pixel % 16, y = pixel / 16;
     const RegionStats sample = view_.pyramid->at(0, x, y);
     const Ray ray = region_ray(view_, {0, x, y});
-    std::vector<EvaluatedStep> whole_steps, piece_steps;
+    EvaluatedSteps whole_steps, piece_steps;
+    std::vector<std::uint32_t> piece_slots;
     const Segment whole = march(ray, sample, view_.plan.range, whole_steps);
     Segment folded;
     const std::vector<std::uint32_t> bricks = bricks_along(volume_, ray, view_.plan.range);
@@ -212,16 +214,18 @@ TEST_F(Composition, CutAtBrickPlanesARayIsTheSameBitForBit) {
       const Piece& piece = pieces[brick];
       const std::size_t before = piece_steps.size();
       folded = folded.then(march(piece.volume, piece.totals, ray, sample, view_.plan.range, piece_steps));
-      for (std::size_t s = before; s < piece_steps.size(); ++s) piece_steps[s].slot += piece.first_slot;
+      for (std::size_t s = before; s < piece_steps.size(); ++s)
+        piece_slots.push_back(piece_steps[s].slot + piece.first_slot);
     }
     cut_rays += bricks.size() > 2;
     ASSERT_EQ(folded.transmittance, whole.transmittance);
     ASSERT_EQ(folded.likelihood, whole.likelihood);
     ASSERT_EQ(piece_steps.size(), whole_steps.size());
     for (std::size_t s = 0; s < whole_steps.size(); ++s) {
-      ASSERT_EQ(piece_steps[s].slot, whole_steps[s].slot);
+      ASSERT_EQ(piece_slots[s], whole_steps[s].slot);
       ASSERT_EQ(piece_steps[s].length, whole_steps[s].length);
-      ASSERT_EQ(piece_steps[s].depth, whole_steps[s].depth);
+      ASSERT_EQ(piece_steps.depth(s).middle, whole_steps.depth(s).middle);
+      ASSERT_EQ(piece_steps.depth(s).half_chord, whole_steps.depth(s).half_chord);
       ASSERT_EQ(piece_steps[s].likelihood, whole_steps[s].likelihood);
       ASSERT_EQ(piece_steps[s].weight, whole_steps[s].weight);
     }
@@ -236,7 +240,7 @@ TEST_F(Composition, CutAnywhereARayIsTheSameUpToRounding) {
     const RegionStats sample = view_.pyramid->at(0, x, y);
     const Ray ray = region_ray(view_, {0, x, y});
     const double cut = depth(random_);
-    std::vector<EvaluatedStep> steps;
+    EvaluatedSteps steps;
     const Segment whole = march(ray, sample, view_.plan.range, steps);
     const Segment front = march(ray, sample, {view_.plan.range.begin, cut}, steps);
     const Segment back = march(ray, sample, {cut, view_.plan.range.end}, steps);
@@ -253,7 +257,7 @@ TEST_F(Composition, StoppingEarlyLeavesOutLessThanItsBound) {
     const int x = pixel % 16, y = pixel / 16;
     const RegionStats sample = view_.pyramid->at(0, x, y);
     const Ray ray = region_ray(view_, {0, x, y});
-    std::vector<EvaluatedStep> all, some;
+    EvaluatedSteps all, some;
     const Segment whole = march(ray, sample, view_.plan.range, all);
     const LatticeStack stack(volume_);
     NodeScratch scratch(stack, volume_.tau);

@@ -1,10 +1,12 @@
 #pragma once
 /// Evaluates one sample against the voxels along its ray: the part that the opacity passes and depth share.
 
+#include <array>
 #include <vector>
 
 #include "roxel/infer/background.h"
 #include "roxel/infer/evidence.h"
+#include "roxel/infer/match.h"
 #include "roxel/infer/sample_view.h"
 #include "roxel/march/segment.h"
 
@@ -15,11 +17,43 @@ struct EvaluatedStep {
   std::uint32_t slot;
   float length;      ///< chord in voxel lengths
   float weight;      ///< ray weight
-  float depth;       ///< along the optical axis, middle of the chord
-  float half_chord;  ///< half the chord's extent in depth
   float opacity;     ///< a
   float likelihood;  ///< p
   float mean_path;   ///< e
+};
+
+/// Where in depth a step's chord lies.
+struct StepDepth {
+  float middle;      ///< along the optical axis, of the chord
+  float half_chord;  ///< half the chord's extent in depth
+};
+
+/// Steps in ray order, kept field by field: the march writes them as it computes them.
+class EvaluatedSteps {
+ public:
+  std::size_t size() const { return size_; }
+  void clear() { size_ = 0; }
+  EvaluatedStep operator[](std::size_t i) const {
+    return {slot_[i],
+            field_[kLength][i],
+            field_[kWeight][i],
+            field_[kOpacity][i],
+            field_[kLikelihood][i],
+            field_[kMeanPath][i]};
+  }
+  float likelihood(std::size_t i) const { return field_[kLikelihood][i]; }
+  /// Only where the march was asked for depths.
+  StepDepth depth(std::size_t i) const { return depth_[i]; }
+
+ private:
+  friend class SegmentMarch;
+  enum Field { kLength, kWeight, kOpacity, kLikelihood, kMeanPath, kFields };
+  void append(const StepChunk& chunk, const MatchBlock& block, int count, bool with_depths);
+
+  std::size_t size_ = 0;
+  std::vector<std::uint32_t> slot_;
+  std::array<std::vector<float>, kFields> field_;
+  std::vector<StepDepth> depth_;
 };
 
 /// The thesis's switches that change a sample along its ray; all off by default.
@@ -51,17 +85,19 @@ class SegmentMarch {
   /// returns (T, Z) from the range's begin, folded from per-brick segments. Stops early once what lies behind
   /// can change Z by less than kNegligible of itself.
   Segment march(const SampleView& view, const Region& region, const RegionStats& sample, const Ray& ray,
-                Stretch range, const Stretch* sight, RemovedColor& removed,
-                std::vector<EvaluatedStep>& steps);
+                Stretch range, const Stretch* sight, RemovedColor& removed, EvaluatedSteps& steps);
 
   /// Every step of the roxels rule counts, so its rays must not stop early.
   void set_early_stop(bool on) { early_stop_ = on; }
+  /// Whether steps get their depths, too.
+  void set_depths(bool on) { depths_ = on; }
 
   static constexpr float kNegligible = 1e-3f;
 
  private:
   bool flush(const SampleView& view, const Region& region, const RegionStats& sample, const StepChunk& chunk,
-             RemovedColor& removed, Segment& total, std::vector<EvaluatedStep>& steps);
+             RemovedColor& removed, Segment& total, EvaluatedSteps& steps);
+  int fold(const StepChunk& chunk, RemovedColor& removed, Segment& total);
   void gather(const SampleView& view, const Region& region, const SampleTerms& terms, const StepChunk& chunk);
   RegionStats background_removed(const SampleView& view, const Ray& ray, const RegionStats& sample);
 
@@ -71,6 +107,7 @@ class SegmentMarch {
   const Background& background_;
   const SampleFilters& filters_;
   bool early_stop_ = true;
+  bool depths_ = false;
 
   StepChunk chunk_;
   MatchBlock block_;

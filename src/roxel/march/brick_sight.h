@@ -22,10 +22,13 @@ class BrickSight {
     const int y = std::min(static_cast<int>(v) / kTileSide, rows_ - 1);
     return &stretches_[static_cast<std::size_t>(y * columns_ + x) * lattices_];
   }
-  /// Whether the ray through (u, v) can meet anything at all.
-  bool any(double u, double v) const {
+  /// The same, or null where the ray through (u, v) cannot meet anything within `range`.
+  const Stretch* within(double u, double v, Stretch range) const {
     const Stretch* stretch = at(u, v);
-    return std::any_of(stretch, stretch + lattices_, [](const Stretch& s) { return s.end > s.begin; });
+    const bool any = std::any_of(stretch, stretch + lattices_, [&](const Stretch& s) {
+      return std::min(s.end, range.end) > std::max(s.begin, range.begin);
+    });
+    return any ? stretch : nullptr;
   }
 
  private:

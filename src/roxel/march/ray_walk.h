@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "roxel/camera/camera.h"
 #include "roxel/volume/volume.h"
@@ -73,11 +74,14 @@ inline int cell_index(CellCode code, int axis) {
   using namespace internal;
   return static_cast<int>(code >> axis * kCellBits & kCellField) - kCellOffset;
 }
-/// voxel_in_brick of the cell.
+/// voxel_in_brick of the cell: one multiplication brings the fields' low bits side by side.
 inline int cell_in_brick(CellCode code) {
   using namespace internal;
-  return static_cast<int>((code & 7) | (code >> (kCellBits - 3) & 0x38) |
-                          (code >> (2 * kCellBits - 6) & 0x1c0));
+  constexpr int kTop =
+      46;  // x's bits end up here, y's and z's above; the other products stay below or fall out
+  constexpr CellCode kGather =
+      CellCode{1} << kTop | CellCode{1} << (kTop + 3 - kCellBits) | CellCode{1} << (kTop + 6 - 2 * kCellBits);
+  return static_cast<int>((code & kCellInBrick) * kGather >> kTop);
 }
 
 /// Positions along a ray inside walk_cells are integers: 2^-28 voxel lengths from the ray's origin. All
@@ -180,9 +184,11 @@ inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame,
     while (true) {
       const std::int64_t first = next_x < next_y ? next_x : next_y;
       const std::int64_t out = first < next_z ? first : next_z;
-      const std::int64_t chord_end = out < end ? out : end;
-      if (chord_end > in && !visit(code, in, chord_end)) return false;
-      if (out >= end) return true;
+      if (out >= end) return end <= in || visit(code, in, end);
+      if (out > in) {
+        if (!visit(code, in, out)) return false;
+        in = out;
+      }
       // Branch-free: every axis whose plane is reached steps.
       const std::int64_t x = -static_cast<std::int64_t>(next_x == out);
       const std::int64_t y = -static_cast<std::int64_t>(next_y == out);
@@ -193,7 +199,6 @@ inline __attribute__((always_inline)) bool walk_cells(const LatticeFrame& frame,
       const CellCode before = code;
       code += (static_cast<CellCode>(x) & step_x) + (static_cast<CellCode>(y) & step_y) +
               (static_cast<CellCode>(z) & step_z);
-      in = in > out ? in : out;
       if (((code ^ before) & ~internal::kCellInBrick) == 0) continue;
       bool outside = false;
       for (int a = 0; a < 3; ++a) {
@@ -252,18 +257,23 @@ void walk_lattices(const std::vector<Eigen::AlignedBox3d>& boxes, const Ray& ray
 /// over.
 struct alignas(64) StepChunk {
   static constexpr int kSize = 64;
+  /// Arrays are worked on so many entries at a time: up to the next multiple of this behind the count, slots
+  /// are good ones and the rest is rubbish.
+  static constexpr int kLanes = 8;
   /// Steps that make a chunk worth handing over at a brick's border: rays then stop soon behind a surface.
-  static constexpr int kEnough = 16;
+  static constexpr int kEnough = 8;
 
   int count = 0;
   int lattice = 0;
   std::uint32_t slot[kSize];
-  float length[kSize];              ///< chord, in voxel lengths of the lattice
-  float weight[kSize];              ///< ray weight
-  std::uint8_t brick_start[kSize];  ///< 1: first step in its brick, where segments break (docs/rays.md)
-  CellCode cell[kSize];             ///< the voxel in the lattice's frame
-  std::int64_t middle[kSize];       ///< twice the position of the chord's middle, in kWalkUnit
-  float depth_per_length;           ///< extent in depth of a chord of one voxel length
+  float length[kSize];         ///< chord, in voxel lengths of the lattice
+  float weight[kSize];         ///< ray weight
+  std::int32_t units[kSize];   ///< chord, in kWalkUnit; at most sqrt(3) of 2^28
+  CellCode cell[kSize];        ///< the voxel in the lattice's frame
+  std::int64_t middle[kSize];  ///< twice the position of the chord's middle, in kWalkUnit
+  int brick_count = 0;         ///< bricks that begin in this chunk; its first steps may be of one before
+  std::uint8_t brick_begin[kSize + 1];  ///< the first step of each: where segments break (docs/rays.md)
+  float depth_per_length;               ///< extent in depth of a chord of one voxel length
 
   /// Depth of the chord's middle.
   float depth(int i) const {
@@ -275,10 +285,10 @@ struct alignas(64) StepChunk {
 
  private:
   friend class LatticeStack;
-  /// Fills `weight`: 1 - d / (sqrt(3)/2), d the distance of the ray's line from the voxel's centre: 1 through
-  /// the centre, 0 through a vertex. [Jethwa04] section 5.1.1. `direction` is the ray's unit direction,
-  /// `near` a point of it near the chunk, in voxels of the frame.
-  void set_weights(const float direction[3], const double near[3]);
+  /// Fills `length`, and `weight`: 1 - d / (sqrt(3)/2), d the distance of the ray's line from the voxel's
+  /// centre: 1 through the centre, 0 through a vertex. [Jethwa04] section 5.1.1. `direction` is the ray's
+  /// unit direction, `near` a point of it near the chunk, in voxels of the frame.
+  void complete(const float direction[3], const double near[3]);
   double depth_per_length_;
 };
 
@@ -330,25 +340,36 @@ class LatticeStack {
           (ray.origin.z() + middle * ray.direction.z() - frame.origin.z()) / frame.voxel_size};
       const std::uint16_t* local = nullptr;
       std::uint32_t first_slot = 0;
-      std::uint8_t starts_brick = 0;
       chunk.lattice = lattice;
       chunk.depth_per_length_ = frame.voxel_size * inverse_norm;
       chunk.depth_per_length = static_cast<float>(chunk.depth_per_length_);
-      int n = 0;
-      const auto hand_over = [&]() __attribute__((noinline)) {
-        chunk.count = n;
-        n = 0;
-        chunk.set_weights(unit, near);
+      // Steps in the chunk, the last brick that began there and where. All that the inner loop changes is
+      // kept out of reach of what is called, so that it stays in registers.
+      std::ptrdiff_t n = 0, last_brick = -1, last_begin = -1;
+      const auto hand_over =
+          [&unit, &near, &chunk, &on_chunk ](int count, int brick_count) __attribute__((noinline)) {
+        chunk.count = count;
+        for (int pad = count; pad % StepChunk::kLanes != 0; ++pad) chunk.slot[pad] = chunk.slot[0];
+        chunk.brick_count = brick_count;
+        chunk.complete(unit, near);
         return on_chunk(static_cast<const StepChunk&>(chunk));
       };
+      const auto flush = [&]() __attribute__((always_inline)) {
+        const std::ptrdiff_t count = std::exchange(n, 0);
+        const int open = std::exchange(last_begin, -1) < count;
+        return hand_over(static_cast<int>(count), static_cast<int>(std::exchange(last_brick, -1)) + open);
+      };
+      const std::ptrdiff_t full = chunk_size;
       const auto enter = [&](int bx, int by, int bz) __attribute__((always_inline)) {
         const std::int32_t found =
             table[bx + static_cast<std::size_t>(nx) * (by + static_cast<std::size_t>(ny) * bz)];
         if (found < 0) return AtBrick::kSkip;
-        if (n >= StepChunk::kEnough && !hand_over()) return AtBrick::kStop;
+        if (n >= StepChunk::kEnough && !flush()) return AtBrick::kStop;
         local = bricks[found].local.data();
         first_slot = bricks[found].first_slot;
-        starts_brick = 1;
+        last_brick += last_begin != n;
+        last_begin = n;
+        chunk.brick_begin[last_brick] = static_cast<std::uint8_t>(n);
         on_brick(first_brick_[lattice] + static_cast<std::uint32_t>(found));
         return AtBrick::kVisit;
       };
@@ -357,18 +378,16 @@ class LatticeStack {
         // Written whether there is a voxel or not, counted if there is: cheaper than a branch that is
         // mispredicted at every surface.
         const std::uint16_t voxel = local[cell_in_brick(code)];
-        const int exists = voxel != kNoVoxel;
+        const std::ptrdiff_t exists = voxel != kNoVoxel;
         chunk.slot[n] = first_slot + voxel;
-        chunk.length[n] = static_cast<float>(out - in) * static_cast<float>(kWalkUnit);
+        chunk.units[n] = static_cast<std::int32_t>(out - in);
         chunk.middle[n] = in + out;
         chunk.cell[n] = code;
-        chunk.brick_start[n] = starts_brick;
-        starts_brick = static_cast<std::uint8_t>(starts_brick & (exists ^ 1));
         n += exists;
-        return n < chunk_size || hand_over();
+        return n < full || flush();
       };
       if (!walk_cells(frame, ray, stretch, enter, visit)) return false;
-      return n == 0 || hand_over();
+      return n == 0 || flush();
     });
   }
 
