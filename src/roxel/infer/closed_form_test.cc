@@ -156,7 +156,7 @@ ColorTotals plain_totals(const std::array<float, 3>& m) {
 struct ThreeVoxelRay {
   Volume volume;
   std::vector<ColorTotals> totals;
-  OpacityPassOptions options;
+  MarchOptions options;
 
   ThreeVoxelRay() {
     Topology topology(LatticeFrame{{0, 0, 0}, 1, {1, 1, 1}});
@@ -229,7 +229,7 @@ TEST(ColorPass, DepositsResponsibilityTimesRayWeightTimesObservation) {
   const LatticeStack stack(ray.volume);
   NodeScratch scratch(stack, ray.volume.tau);
   const SampleNode node{along_x({50, 8, -3}, 0.4f)};
-  march_color(stack, node, ray.options.model, ray.options.background, false, RunContext(1), scratch);
+  march_color(stack, node, ray.options, false, RunContext(1), scratch);
   const double a = 1 - std::exp(-0.3);
   for (int i = 0; i < 3; ++i) {
     const double w = 0.4 * a * std::pow(1 - a, i);
@@ -238,7 +238,7 @@ TEST(ColorPass, DepositsResponsibilityTimesRayWeightTimesObservation) {
     EXPECT_NEAR(scratch[i].cov[5], 8 * -3 * w, 50e-6);
   }
   scratch.reset();
-  march_color(stack, node, ray.options.model, ray.options.background, true, RunContext(1), scratch);
+  march_color(stack, node, ray.options, true, RunContext(1), scratch);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(scratch[i].evidence, 0.4, 1e-6);
 }
 
@@ -249,8 +249,7 @@ TEST(ColorPass, SamplesOfAKnownBackgroundColourNothing) {
   const LatticeStack stack(ray.volume);
   NodeScratch scratch(stack, ray.volume.tau);
   ray.options.model.agreement = Agreement::kGaussian;
-  march_color(stack, {along_x({50, 0, 0}, 1)}, ray.options.model, ray.options.background, true, RunContext(1),
-              scratch);
+  march_color(stack, {along_x({50, 0, 0}, 1)}, ray.options, true, RunContext(1), scratch);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(scratch[i].evidence, 0, 1e-6);
 }
 

@@ -125,7 +125,7 @@ TEST(MarchColor, WeighsSamplesByTheirForeground) {
     const SampleNode node{fixture::view_of(camera, fixture::plain_image(12, {50, 10, -10}),
                                            fixture::plan_of({1, 60}, 0), {}, Mask(12, 12, foreground))};
     NodeScratch scratch(stack, volume.tau);
-    march_color(stack, node, MatchModel(), Background(), false, RunContext(1), scratch);
+    march_color(stack, node, MarchOptions(), false, RunContext(1), scratch);
     double sum = 0;
     for (const std::uint32_t brick : scratch.entered_bricks())
       for (std::uint32_t v = 0; v < stack.brick(brick).count; ++v)

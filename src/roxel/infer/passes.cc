@@ -43,9 +43,13 @@ void for_each_root(const LatticeStack& stack, const SampleNode& node, const RunC
 
 class ColorMarch {
  public:
-  ColorMarch(const LatticeStack& stack, const MatchModel& model, const Background& background,
-             bool everywhere, NodeScratch& scratch)
-      : stack_(stack), model_(model), background_(background), everywhere_(everywhere), scratch_(scratch) {}
+  ColorMarch(const LatticeStack& stack, const MarchOptions& options, bool everywhere, NodeScratch& scratch)
+      : stack_(stack),
+        model_(options.model),
+        background_(options.background),
+        everywhere_(everywhere),
+        spent_(options.rule == UpdateRule::kRoxels ? kSpentRoxels : kSpent),
+        scratch_(scratch) {}
 
   void march(const ViewInSight& in_sight, const Region& region, double begin, float transmittance) {
     const SampleView& view = in_sight.view;
@@ -54,7 +58,7 @@ class ColorMarch {
     const Stretch range = served_range(view, region, begin);
     if (range.end > range.begin) transmittance = deposit(in_sight, region, sample, range, transmittance);
     if (range.end >= view.plan.range.end || region.level == view.plan.finest_level) return;
-    if (!everywhere_ && transmittance < kOpaque) return;
+    if (!everywhere_ && transmittance < spent_) return;
     for (int c = 0; c < 4; ++c)
       if (const Region child = region.child(c); inside(view, child))
         march(in_sight, child, std::max(range.begin, range.end), transmittance);
@@ -63,7 +67,9 @@ class ColorMarch {
   PassCounts counts;
 
  private:
-  static constexpr float kOpaque = 3e-4f;
+  /// Transmittance below which what lies behind is not coloured. The roxels rule gives hidden voxels opacity
+  /// as well, so that their colours count for more.
+  static constexpr float kSpent = 1e-3f, kSpentRoxels = 1e-5f;
   static constexpr float kNothing = 1e-6f;  ///< weights that cannot matter against evidence_half
 
   float deposit(const ViewInSight& in_sight, const Region& region, const RegionStats& sample, Stretch range,
@@ -88,7 +94,7 @@ class ColorMarch {
         [&](const StepChunk& chunk) {
           counts.steps += chunk.count;
           transmittance = add_to_voxels(chunk, sample.mean, second, weight, transmittance);
-          return everywhere_ || transmittance > kOpaque;
+          return everywhere_ || transmittance > spent_;
         });
     return transmittance;
   }
@@ -117,6 +123,7 @@ class ColorMarch {
   const MatchModel& model_;
   const Background& background_;
   bool everywhere_;
+  float spent_;
   NodeScratch& scratch_;
   StepChunk chunk_;
 };
@@ -135,7 +142,7 @@ struct TreeNode {
 
 class OpacityMarch {
  public:
-  OpacityMarch(const LatticeStack& stack, const OpacityPassOptions& options, NodeScratch& scratch)
+  OpacityMarch(const LatticeStack& stack, const MarchOptions& options, NodeScratch& scratch)
       : options_(options),
         scratch_(scratch),
         march_(stack, scratch, options.model, options.background, options.filters) {
@@ -272,7 +279,7 @@ class OpacityMarch {
       if (child >= 0) distribute_roxels(child, path_sum, explained);
   }
 
-  const OpacityPassOptions& options_;
+  const MarchOptions& options_;
   NodeScratch& scratch_;
   SegmentMarch march_;
   std::vector<TreeNode> tree_;
@@ -281,17 +288,16 @@ class OpacityMarch {
 
 }  // namespace
 
-PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MatchModel& model,
-                       const Background& background, bool everywhere, const RunContext& context,
-                       NodeScratch& scratch) {
-  ColorMarch march(stack, model, background, everywhere, scratch);
+PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
+                       bool everywhere, const RunContext& context, NodeScratch& scratch) {
+  ColorMarch march(stack, options, everywhere, scratch);
   for_each_root(stack, node, context, [&](const ViewInSight& in_sight, const Region& region) {
     march.march(in_sight, region, in_sight.view.plan.range.begin, 1.0f);
   });
   return march.counts;
 }
 
-PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const OpacityPassOptions& options,
+PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
                          const RunContext& context, NodeScratch& scratch) {
   OpacityMarch march(stack, options, scratch);
   for_each_root(stack, node, context,

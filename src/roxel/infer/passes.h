@@ -21,14 +21,8 @@ struct PassCounts {
   PassCounts& operator+=(const PassCounts& other);
 };
 
-/// Colour: adds each sample to the voxels along its ray with weight responsibility x ray weight x observation
-/// weight, where the responsibility is a_s T_s from the global opacities, or 1 everywhere when `everywhere`.
-/// Samples of a known background colour nothing.
-PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MatchModel& model,
-                       const Background& background, bool everywhere, const RunContext& context,
-                       NodeScratch& scratch);
-
-struct OpacityPassOptions {
+/// What the marches of a pass, of colour and of opacity, have in common.
+struct MarchOptions {
   UpdateRule rule = UpdateRule::kPosterior;
   MatchModel model;
   Background background;
@@ -36,9 +30,15 @@ struct OpacityPassOptions {
   bool ray_weights = false;  ///< weigh opacity sums by the ray weight, too
 };
 
+/// Colour: adds each sample to the voxels along its ray with weight responsibility x ray weight x observation
+/// weight, where the responsibility is a_s T_s from the global opacities, or 1 everywhere when `everywhere`.
+/// Samples of a known background colour nothing.
+PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
+                       bool everywhere, const RunContext& context, NodeScratch& scratch);
+
 /// Opacity: adds each sample's responsibilities to hits, exposure and looked of the voxels that its ray
 /// meets. The scratch holds the colours to compare with (NodeScratch::compare_with).
-PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const OpacityPassOptions& options,
+PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
                          const RunContext& context, NodeScratch& scratch);
 
 }  // namespace roxel

@@ -13,7 +13,7 @@ using fixture::random_volume;
 /// A volume and its photographs, with the colours and the prior's field held: passes move tau alone.
 class HeldColors {
  public:
-  HeldColors(Volume volume, std::vector<SampleNode> nodes, const OpacityPassOptions& options)
+  HeldColors(Volume volume, std::vector<SampleNode> nodes, const MarchOptions& options)
       : volume_(std::move(volume)),
         nodes_(std::move(nodes)),
         options_(options),
@@ -52,7 +52,7 @@ class HeldColors {
   RunContext context_{1};
   Volume volume_;
   std::vector<SampleNode> nodes_;
-  OpacityPassOptions options_;
+  MarchOptions options_;
   LatticeStack stack_;
   NodeScratch scratch_;
   CollectedColors collected_;
@@ -99,7 +99,7 @@ RC_GTEST_PROP(PosteriorPass, NeverLowersLikelihoodTimesPrior, ()) {
   std::vector<float> field(volume.slot_count());
   for (float& alpha : field) alpha = opacity(random);
   std::vector<SampleNode> nodes = nodes_around(volume, drawn.views, 8, drawn.divisions, random);
-  OpacityPassOptions options;
+  MarchOptions options;
   options.background.kind = drawn.background;
   options.background.mean[0] = 50;
   HeldColors held(std::move(volume), std::move(nodes), options);

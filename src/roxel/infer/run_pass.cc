@@ -95,8 +95,7 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
   const PassCounts counts = sum(for_each_node(nodes, context, progress, 0, 0.3, [&](int node, int worker) {
     NodeScratch& scratch = pool.of(worker);
     const PassCounts node_counts =
-        march_color(stack, nodes[node], options.opacity.model, options.opacity.background, options.everywhere,
-                    context, scratch);
+        march_color(stack, nodes[node], options.opacity, options.everywhere, context, scratch);
     colors.totals.add_color(stack, scratch);
     if (options.predictive) colors.kept.keep(node, scratch);
     return node_counts;
@@ -109,8 +108,7 @@ void compare_with_others(const LatticeStack& stack, const std::vector<SampleNode
                          const PassOptions& options, const CollectedColors& colors, const RunContext& context,
                          NodeScratch& scratch) {
   if (options.predictive && !colors.kept.put_back(node, scratch))
-    march_color(stack, nodes[node], options.opacity.model, options.opacity.background, options.everywhere,
-                context, scratch);
+    march_color(stack, nodes[node], options.opacity, options.everywhere, context, scratch);
   scratch.compare_with(colors.totals.color, &colors.of_totals);
 }
 

@@ -8,7 +8,7 @@
 namespace roxel {
 
 struct PassOptions {
-  OpacityPassOptions opacity;
+  MarchOptions opacity;
   PriorOptions prior;
   bool predictive = true;  ///< leave a ray's own node out of the colour that it is compared with
   std::size_t kept_color_bytes = std::size_t{1} << 30;  ///< see KeptColors; changes no result

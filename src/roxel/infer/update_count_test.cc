@@ -146,7 +146,7 @@ TEST(UpdatesPerVoxel, AreWhatTheColourPassDoes) {
   const UpdateCounter counter(tunnel.volume(), view);
   const LatticeStack stack(tunnel.volume());
   NodeScratch scratch(stack, tunnel.volume().tau);
-  const PassCounts counts = march_color(stack, {view}, {}, {}, true, RunContext(1), scratch);
+  const PassCounts counts = march_color(stack, {view}, {}, true, RunContext(1), scratch);
   EXPECT_EQ(counts.steps, counter.steps);
 }
 
