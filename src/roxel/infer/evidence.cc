@@ -69,42 +69,18 @@ void NodeScratch::look_up(std::uint32_t slot, VoxelScratch& voxel) const {
   voxel.evidence = color.evidence;
 }
 
-OwnColors NodeScratch::own_colors() const {
-  OwnColors own;
-  std::size_t colored = 0;
-  for_each_entered_slot(*stack_, *this, [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t slot = begin; slot < end; ++slot) colored += voxels_[slot].evidence > 0;
-  });
-  own.entries.reserve(colored);
-  own.bricks.reserve(order_.size());
-  for (const std::uint32_t number : order_) {
-    const Brick& brick = stack_->brick(number);
-    const std::size_t before = own.entries.size();
-    for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count; ++slot) {
-      const VoxelScratch& voxel = voxels_[slot];
-      if (voxel.evidence <= 0) continue;
-      OwnColors::Entry entry{slot, {}, {}, voxel.evidence};
-      std::copy(voxel.mean, voxel.mean + 3, entry.mean);
-      std::copy(voxel.cov, voxel.cov + 6, entry.cov);
-      own.entries.push_back(entry);
-    }
-    if (own.entries.size() > before)
-      own.bricks.push_back({number, static_cast<std::uint32_t>(own.entries.size() - before)});
-  }
-  return own;
+OwnColors::Entry OwnColors::Entry::of(std::uint32_t slot, const VoxelScratch& voxel) {
+  Entry entry{slot, {}, {}, voxel.evidence};
+  std::copy(voxel.mean, voxel.mean + 3, entry.mean);
+  std::copy(voxel.cov, voxel.cov + 6, entry.cov);
+  return entry;
 }
 
-void NodeScratch::put_back(const OwnColors& own) {
-  const OwnColors::Entry* entry = own.entries.data();
-  for (const OwnColors::BrickPart& part : own.bricks) {
-    enter(part.brick);
-    for (std::uint32_t i = 0; i < part.count; ++i, ++entry) {
-      VoxelScratch& voxel = voxels_[entry->slot];
-      std::copy(entry->mean, entry->mean + 3, voxel.mean);
-      std::copy(entry->cov, entry->cov + 6, voxel.cov);
-      voxel.evidence = entry->evidence;
-    }
-  }
+/// What the other nodes say: the totals less the node's own.
+void NodeScratch::leave_out(const ColorTotals& own, std::uint32_t slot, VoxelScratch& voxel) const {
+  ColorTotals others = totals_[slot];
+  for (int c = 0; c < 10; ++c) others[c] -= own[c];
+  color_of(others, voxel.mean, voxel.cov, voxel.evidence);
 }
 
 void NodeScratch::compare_with(const std::vector<ColorTotals>& totals,
@@ -115,16 +91,29 @@ void NodeScratch::compare_with(const std::vector<ColorTotals>& totals,
     for (std::uint32_t slot = begin; slot < end; ++slot) {
       VoxelScratch& voxel = voxels_[slot];
       if (voxel.evidence > 0) {
-        ColorTotals others = totals[slot];
-        const ColorTotals own = capped_color(voxel);
-        for (int c = 0; c < 10; ++c) others[c] -= own[c];
-        color_of(others, voxel.mean, voxel.cov, voxel.evidence);
+        leave_out(capped_color(voxel), slot, voxel);
       } else {
         look_up(slot, voxel);
       }
       voxel.hits = voxel.exposure = voxel.looked = 0;
     }
   });
+}
+
+void NodeScratch::compare_with(const std::vector<ColorTotals>& totals, const std::vector<VoxelColor>* colors,
+                               const OwnColors& own) {
+  compare_with(totals, colors);
+  const OwnColors::Entry* entry = own.entries.data();
+  for (const OwnColors::BrickPart& part : own.bricks) {
+    enter(part.brick);
+    for (std::uint32_t i = 0; i < part.count; ++i, ++entry) {
+      VoxelScratch& voxel = voxels_[entry->slot];
+      std::copy(entry->mean, entry->mean + 3, voxel.mean);
+      std::copy(entry->cov, entry->cov + 6, voxel.cov);
+      voxel.evidence = entry->evidence;
+      leave_out(capped_color(voxel), entry->slot, voxel);
+    }
+  }
 }
 
 void NodeScratch::reset() {
@@ -165,14 +154,24 @@ Totals::Totals(std::uint32_t slot_count) : color(slot_count), opacity(slot_count
 void Totals::clear_color() { std::fill(color.begin(), color.end(), ColorTotals{}); }
 void Totals::clear_opacity() { std::fill(opacity.begin(), opacity.end(), OpacityTotals{}); }
 
-void Totals::add_color(const LatticeStack& stack, const NodeScratch& node) {
+void Totals::add_color(const LatticeStack& stack, const NodeScratch& node, OwnColors* own) {
+  if (own) {  // room for all, of which only what is written takes memory
+    std::size_t entered = 0;
+    for (const std::uint32_t number : node.entered_bricks()) entered += stack.brick(number).count;
+    own->entries.reserve(entered);
+  }
   for_each_entered_slot(stack, node, [&](std::uint32_t brick, std::uint32_t begin, std::uint32_t end) {
     const BrickLock lock(*this, brick);
+    std::uint32_t count = 0;
     for (std::uint32_t slot = begin; slot < end; ++slot) {
-      if (node[slot].evidence <= 0) continue;
-      const ColorTotals sums = capped_color(node[slot]);
+      const VoxelScratch& voxel = node[slot];
+      if (voxel.evidence <= 0) continue;
+      const ColorTotals sums = capped_color(voxel);
       for (int c = 0; c < 10; ++c) color[slot][c] += sums[c];
+      if (own) own->entries.push_back(OwnColors::Entry::of(slot, voxel));
+      ++count;
     }
+    if (own && count > 0) own->bricks.push_back({brick, count});
   });
 }
 
@@ -182,6 +181,7 @@ void Totals::add_opacity(const LatticeStack& stack, const NodeScratch& node) {
     const BrickLock lock(*this, brick);
     for (std::uint32_t slot = begin; slot < end; ++slot) {
       const VoxelScratch& voxel = node[slot];
+      if (voxel.hits == 0 && voxel.exposure == 0 && voxel.looked == 0) continue;
       opacity[slot][0] += saturated(voxel.hits);
       opacity[slot][1] += saturated(voxel.exposure);
       opacity[slot][2] += saturated(voxel.looked);

@@ -55,6 +55,7 @@ struct OwnColors {
     float mean[3];
     float cov[6];
     float evidence;
+    static Entry of(std::uint32_t slot, const VoxelScratch& voxel);
   };
   std::vector<BrickPart> bricks;
   std::vector<Entry> entries;
@@ -82,9 +83,9 @@ class NodeScratch {
   /// less the node's own, capped); bricks entered from now on get the totals, and opacity sums start at 0.
   /// `colors` is color_of of all totals, when someone has it.
   void compare_with(const std::vector<ColorTotals>& totals, const std::vector<VoxelColor>* colors = nullptr);
-  /// The node's own colour sums, to be put back into a scratch that has been reset.
-  OwnColors own_colors() const;
-  void put_back(const OwnColors& own);
+  /// The same for a scratch that has been reset, with the node's own colour sums from Totals::add_color.
+  void compare_with(const std::vector<ColorTotals>& totals, const std::vector<VoxelColor>* colors,
+                    const OwnColors& own);
   const std::vector<std::uint32_t>& entered_bricks() const { return order_; }
   /// Forgets the node.
   void reset();
@@ -92,6 +93,7 @@ class NodeScratch {
  private:
   void set_up_brick(std::uint32_t brick);
   void look_up(std::uint32_t slot, VoxelScratch& voxel) const;
+  void leave_out(const ColorTotals& own, std::uint32_t slot, VoxelScratch& voxel) const;
 
   const LatticeStack* stack_;
   const float* tau_;
@@ -112,7 +114,8 @@ class Totals {
   explicit Totals(std::uint32_t slot_count);
   void clear_color();
   void clear_opacity();
-  void add_color(const LatticeStack& stack, const NodeScratch& node);
+  /// `own`, unless null, gets the node's sums.
+  void add_color(const LatticeStack& stack, const NodeScratch& node, OwnColors* own = nullptr);
   void add_opacity(const LatticeStack& stack, const NodeScratch& node);
 
   std::vector<ColorTotals> color;

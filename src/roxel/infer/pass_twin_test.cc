@@ -153,12 +153,8 @@ TEST(RunPass, KeepingOwnColorsChangesNoResult) {
   CollectedColors collected(start.slot_count(), nodes.size(), std::size_t{1} << 30);
   const LatticeStack stack(start);
   collect_color(stack, nodes, PassOptions(), RunContext(1), nullptr, collected);
-  NodeScratch scratch(stack, start.tau);
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    scratch.reset();
-    ASSERT_TRUE(collected.kept.put_back(n, scratch));
-  }
-  const std::size_t one_node = scratch.own_colors().bytes();
+  for (std::size_t n = 0; n < nodes.size(); ++n) ASSERT_TRUE(collected.kept.of(n));
+  const std::size_t one_node = collected.kept.of(0)->bytes();
   ASSERT_GT(one_node, 1000u);
   const Volume none = after(0);
   EXPECT_NE(none.tau, start.tau);

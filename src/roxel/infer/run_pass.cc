@@ -96,8 +96,10 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
     NodeScratch& scratch = pool.of(worker);
     const PassCounts node_counts =
         march_color(stack, nodes[node], options.opacity, options.everywhere, context, scratch);
-    colors.totals.add_color(stack, scratch);
-    if (options.predictive) colors.kept.keep(node, scratch);
+    OwnColors own;
+    const bool keep = options.predictive && colors.kept.has_room();
+    colors.totals.add_color(stack, scratch, keep ? &own : nullptr);
+    if (keep) colors.kept.keep(node, std::move(own));
     return node_counts;
   }));
   colors.of_totals = colors_of(colors.totals.color, context.thread_count());
@@ -107,7 +109,9 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
 void compare_with_others(const LatticeStack& stack, const std::vector<SampleNode>& nodes, std::size_t node,
                          const PassOptions& options, const CollectedColors& colors, const RunContext& context,
                          NodeScratch& scratch) {
-  if (options.predictive && !colors.kept.put_back(node, scratch))
+  const OwnColors* own = options.predictive ? colors.kept.of(node) : nullptr;
+  if (own) return scratch.compare_with(colors.totals.color, &colors.of_totals, *own);
+  if (options.predictive)
     march_color(stack, nodes[node], options.opacity, options.everywhere, context, scratch);
   scratch.compare_with(colors.totals.color, &colors.of_totals);
 }
@@ -115,21 +119,13 @@ void compare_with_others(const LatticeStack& stack, const std::vector<SampleNode
 KeptColors::KeptColors(std::size_t node_count, std::size_t limit_bytes)
     : left_bytes_(static_cast<std::int64_t>(limit_bytes)), nodes_(node_count) {}
 
-void KeptColors::keep(std::size_t node, const NodeScratch& scratch) {
-  if (left_bytes_ <= 0) return;
-  OwnColors own = scratch.own_colors();
+void KeptColors::keep(std::size_t node, OwnColors own) {
   const std::int64_t bytes = static_cast<std::int64_t>(own.bytes());
   if (left_bytes_.fetch_sub(bytes) < bytes) {
     left_bytes_ += bytes;
     return;
   }
   nodes_[node] = std::make_unique<OwnColors>(std::move(own));
-}
-
-bool KeptColors::put_back(std::size_t node, NodeScratch& scratch) const {
-  if (!nodes_[node]) return false;
-  scratch.put_back(*nodes_[node]);
-  return true;
 }
 
 PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,

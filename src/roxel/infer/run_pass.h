@@ -40,9 +40,11 @@ class KeptColors {
  public:
   KeptColors(std::size_t node_count, std::size_t limit_bytes);
   /// Called at most once a node; safe from several threads for different nodes.
-  void keep(std::size_t node, const NodeScratch& scratch);
-  /// False where the node's colours were not kept.
-  bool put_back(std::size_t node, NodeScratch& scratch) const;
+  void keep(std::size_t node, OwnColors own);
+  /// Whether anything more may be kept.
+  bool has_room() const { return left_bytes_ > 0; }
+  /// Null where the node's colours were not kept.
+  const OwnColors* of(std::size_t node) const { return nodes_[node].get(); }
 
  private:
   std::atomic<std::int64_t> left_bytes_;
