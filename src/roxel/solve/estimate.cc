@@ -1,5 +1,5 @@
 // The model. A level's voxels: at first, the cells of its lattices that some view sees. Later, sheets around
-// surfaces and what has not been carved yet: on real scenes their number is about 3.6 sqrt(N) times the
+// surfaces and what has not been carved yet: on real scenes their number is about 1.8 sqrt(N) times the
 // number of cells in the box's mean cross-section, N being the box's mean side in cells. Rays cross as many
 // of them as lie behind each other, times a share. Everything else is counting bytes and nanoseconds.
 #include "roxel/solve/estimate.h"
@@ -15,18 +15,18 @@ namespace roxel {
 namespace {
 
 // Measured on plane, head, templeSparseRing and dtu-scan24 (with and without masks), at 64 to 256 voxels.
-constexpr double kSheetFactor = 3.6;
-constexpr double kInsideFactor = 1.7;  ///< times that, around cameras that stand in the box (courtyard)
-constexpr double kCrossedShare = 0.2;
+constexpr double kSheetFactor = 1.8;
+constexpr double kInsideFactor = 3.4;  ///< times that, around cameras that stand in the box (courtyard)
+constexpr double kCrossedShare = 0.4;
 constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
 constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level
-constexpr double kSurroundShare = 0.45;      ///< of the box's voxels, for each surround lattice
-constexpr double kSurroundSteps = 8;         ///< more steps a ray for each surround lattice
+constexpr double kSurroundShare = 0.15;      ///< of the box's voxels, for each surround lattice
+constexpr double kSurroundSteps = 2;         ///< more steps a ray for each surround lattice
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
 // Nanoseconds on one core: a ray-voxel step of the colour and the opacity march, loading a pixel.
-constexpr double kColorStepNs = 60;  // with what is done once a voxel and node
-constexpr double kOpacityStepNs = 75;
+constexpr double kColorStepNs = 45;  // with what is done once a voxel and node
+constexpr double kOpacityStepNs = 55;
 constexpr double kLoadPixelNs = 60;
 constexpr double kDraftCost = 0.45;  ///< of a pass on all samples
 
