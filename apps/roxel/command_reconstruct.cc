@@ -157,6 +157,9 @@ class Run {
   void make_volume(Session& session, const Volume* initial) {
     ReconstructHooks hooks;
     hooks.initial = initial;
+    hooks.after_survey = [&](const Scene& scene) {
+      for (const std::string& warning : scene.warnings) warn(options_.common, warning);
+    };
     hooks.after_pass = [&](const PassRecord& record) {
       session.display().line(pass_text(record, options_.reconstruct));
     };
@@ -222,6 +225,7 @@ class Run {
     record.frame = made_.volume.index(0).frame();
     record.summary = made_.summary;
     record.warnings = input_.dataset.warnings;
+    record.warnings.insert(record.warnings.end(), made_.scene.warnings.begin(), made_.scene.warnings.end());
     record.views = views_;
     record.reprojection_rms = reprojection_rms_;
     for (std::size_t v = 0; v < hashes_.size(); ++v) {

@@ -101,8 +101,7 @@ Description describe(const Input& input, const ReconstructOptions& options, RunC
   const BoxVisibility seen = box_visibility(dataset, scene.bounds, scene.voxel_size);
   const CostEstimate cost = estimate_cost(dataset, scene, options, context.thread_count());
   std::vector<std::string> warnings = dataset.warnings;
-  for (const std::string& warning : scale_warnings(dataset, scene.bounds, scene.voxel_size))
-    warnings.push_back(warning);
+  warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
   std::vector<std::string> notes = dataset.notes;
   notes.insert(notes.end(), scene.notes.begin(), scene.notes.end());
   const int masks = count_masks(dataset), lenses = count_lenses(dataset);

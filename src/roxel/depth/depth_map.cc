@@ -42,8 +42,8 @@ PixelDepth moments(const std::vector<Share>& shares, std::size_t begin, std::siz
   return {static_cast<float>(mean), static_cast<float>(std::max(0.0, second / weight - mean * mean)), 0};
 }
 
-/// The run of shares around `middle` whose chords follow on each other and carry at least a hundredth of the
-/// largest responsibility nearby.
+/// The run of shares around `middle` whose chords follow on each other and carry at least a fiftieth of the
+/// middle one's responsibility.
 std::pair<std::size_t, std::size_t> main_mode(const std::vector<Share>& shares, std::size_t middle) {
   const float least = 0.02f * shares[middle].r;
   const auto joined = [&](std::size_t a, std::size_t b) {
@@ -58,16 +58,18 @@ std::pair<std::size_t, std::size_t> main_mode(const std::vector<Share>& shares, 
 PixelDepth summarise(const std::vector<Share>& shares, float total, float voxel_variance,
                      DepthEstimate estimate) {
   if (total < DepthMap::kLeastOpacity || shares.empty()) return {0, 0, total};
-  PixelDepth all = moments(shares, 0, shares.size());
+  const PixelDepth mean = moments(shares, 0, shares.size());
   const std::size_t middle = median_share(shares, total);
-  if (estimate == DepthEstimate::kMedian) all.depth = shares[middle].depth;
+  PixelDepth pixel = mean;
+  if (estimate == DepthEstimate::kMedian) pixel.depth = shares[middle].depth;
   if (estimate == DepthEstimate::kMainMode) {
     const auto [begin, end] = main_mode(shares, middle);
-    all.depth = moments(shares, begin, end).depth;
+    pixel.depth = moments(shares, begin, end).depth;
   }
-  all.variance += voxel_variance;
-  all.opacity = total;
-  return all;
+  const float off = pixel.depth - mean.depth;
+  pixel.variance = mean.variance + off * off + voxel_variance;
+  pixel.opacity = total;
+  return pixel;
 }
 
 /// Evaluates single pixels against the colours that a prepared scratch holds.

@@ -10,7 +10,7 @@ namespace roxel {
 /// Planes of one float a pixel, of the view's size.
 struct DepthMap {
   Image depth;     ///< distance along the optical axis, world units; 0 = none (opacity below kLeastOpacity)
-  Image variance;  ///< of the depth, world units squared
+  Image variance;  ///< mean square of where the ray ends less `depth`, over all r, world units squared
   Image opacity;   ///< posterior probability that the ray ends in the box
 
   static constexpr float kLeastOpacity = 0.05f;

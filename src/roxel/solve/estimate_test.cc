@@ -69,7 +69,8 @@ TEST(EstimateCost, GrowsWithWhatIsAskedFor) {
 
 TEST(EstimateCost, ThreadsDivideTimeAndAddScratch) {
   const Dataset dataset = cube_dataset(6, 96);
-  const CostEstimate one = estimated(dataset, options_at(64), 1), four = estimated(dataset, options_at(64), 4);
+  const CostEstimate one = estimated(dataset, options_at(64), 1),
+                     four = estimated(dataset, options_at(64), 4);
   EXPECT_DOUBLE_EQ(four.seconds, one.seconds / 4);
   EXPECT_GT(four.memory_bytes, one.memory_bytes);
 }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "roxel/base/error.h"
 #include "roxel/infer/touch.h"
 #include "roxel/volume/refine.h"
 
@@ -64,6 +65,9 @@ PassRecord make_record(int level, int pass, bool draft, const Volume& volume, co
 Volume first_volume(const Scene& scene, const std::vector<SampleNode>& samples,
                     const ReconstructOptions& options, const RunContext& context, const Volume* initial) {
   Volume volume(reached_voxels(frames_of_first_level(scene, options), samples, context));
+  if (volume.box_slot_count() == 0)
+    throw_invalid("bounds", "a box and depths in which no ray of any photograph meets a voxel",
+                  "a box that photographs show: see --bounds, --near, --far and the warnings of roxel info");
   volume.resize_channels();
   std::fill(volume.tau.begin(), volume.tau.end(), tau_from_alpha(static_cast<float>(options.prior_opacity)));
   if (initial) initialise_from(*initial, volume);
@@ -86,7 +90,7 @@ Accelerate which_steps(const Scene& scene) {
 }
 
 /// Passes, the first of them drafts, until the opacities rest or the limit is reached; returns whether they
-/// rest.
+/// rest. The last pass is never hurried: its opacities follow from its sums alone, which `merge` relies on.
 bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions& options, int level,
                 bool first_ever, const RunContext& context, LevelProgress& progress,
                 const ReconstructHooks& hooks, const Scene& scene, Volume& volume, Summary& summary) {
@@ -94,19 +98,23 @@ bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions
   const std::vector<SampleNode> drafts = drafts_of(samples);
   int draft_passes = std::min(options.draft_passes, options.passes - 1);
   Acceleration acceleration(volume.slot_count(), options.acceleration, which_steps(scene));
+  bool resting = false;
   for (int pass = 1; pass <= options.passes; ++pass) {
     const auto start = Clock::now();
     const bool draft = pass <= draft_passes;
+    const bool last = resting || pass == options.passes;
     pass_opts.everywhere = first_ever && pass == 1;
     const PassReport report = run_pass(
         draft ? drafts : samples, pass_opts, context,
         [&](double fraction) { progress.report(level, pass, fraction); }, volume,
-        pass < options.passes ? &acceleration : nullptr);
+        last ? nullptr : &acceleration);
     summary.passes.push_back(make_record(level, pass, draft, volume, report, seconds_since(start)));
     if (hooks.after_pass) hooks.after_pass(summary.passes.back());
-    if (options.all_passes || report.update.mean_opacity_change >= options.tolerance) continue;
-    if (!draft) return true;
-    draft_passes = pass;  // drafts say no more: on to the samples themselves
+    const bool rests = report.update.mean_opacity_change < options.tolerance;
+    if (last) return resting || rests;
+    if (options.all_passes || !rests) continue;
+    resting = !draft;
+    draft_passes = std::min(draft_passes, pass);  // drafts say no more: on to the samples themselves
   }
   return false;
 }
@@ -163,7 +171,9 @@ Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
   Reconstruction result;
   Summary& summary = result.summary;
   result.scene = survey(dataset, load, options, context);
-  summary.notes = result.scene.notes;
+  summary.notes = dataset.notes;
+  summary.notes.insert(summary.notes.end(), result.scene.notes.begin(), result.scene.notes.end());
+  if (hooks.after_survey) hooks.after_survey(result.scene);
   summary.stages.push_back({"survey", seconds_since(start)});
 
   LevelProgress progress(options, context, progress_share);

@@ -16,6 +16,7 @@ struct Reconstruction {
 
 /// What a caller may watch or provide. All optional.
 struct ReconstructHooks {
+  std::function<void(const Scene&)> after_survey;
   std::function<void(const PassRecord&)> after_pass;
   std::function<void(const Volume&, const Scene&, const Summary&)> after_level;
   /// Opacities and colours to start from (--init), as a volume of any resolution in the same colour space.

@@ -200,9 +200,11 @@ TEST(Reconstruct, StopsALevelThatHasComeToRest) {
   EXPECT_LT(result.summary.passes.size(), 50u);
   EXPECT_TRUE(result.summary.levels.back().converged);
   EXPECT_EQ(result.summary.termination, "converged");
-  EXPECT_LT(result.summary.passes.back().mean_opacity_change, 0.02);
-  for (std::size_t i = 0; i + 1 < result.summary.passes.size(); ++i)
-    EXPECT_GE(result.summary.passes[i].mean_opacity_change, 0.02);
+  // One that rests, and after it one that is not hurried.
+  const std::size_t count = result.summary.passes.size();
+  ASSERT_GE(count, 3u);
+  EXPECT_LT(result.summary.passes[count - 2].mean_opacity_change, 0.02);
+  for (std::size_t i = 0; i + 2 < count; ++i) EXPECT_GE(result.summary.passes[i].mean_opacity_change, 0.02);
 }
 
 TEST(Reconstruct, DraftsThatHaveComeToRestAreFollowedByPassesOnAllSamples) {

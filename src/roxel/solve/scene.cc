@@ -6,6 +6,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
+#include "roxel/dataset/box_visibility.h"
 #include "roxel/solve/background_choice.h"
 
 namespace roxel {
@@ -30,8 +31,9 @@ MatchModel make_model(const ReconstructOptions& options) {
   return model;
 }
 
-BoundsOptions bounds_options(const ReconstructOptions& options) {
+BoundsOptions bounds_options(const ReconstructOptions& options, const PhotographLoader& load) {
   BoundsOptions bounds;
+  bounds.load_masks = load;
   bounds.near = options.near;
   bounds.far = options.far;
   if (options.bounds) {
@@ -102,12 +104,7 @@ double footprint_px(const PinholeCamera& camera, const Scene& scene, double voxe
 Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options) {
   reconstruct_option_table().validate(options);
   Scene scene;
-  scene.bounds = default_bounds(dataset, bounds_options(options));
-  if (!options.bounds && load) {
-    const Eigen::AlignedBox3d tightened = tighten_by_masks(scene.bounds.box, dataset, load);
-    if (!tightened.isApprox(scene.bounds.box)) scene.bounds.how += "; tightened by masks";
-    scene.bounds.box = tightened;
-  }
+  scene.bounds = default_bounds(dataset, bounds_options(options, load));
   scene.seen_from_inside = std::any_of(dataset.views.begin(), dataset.views.end(), [&](const View& view) {
     return scene.bounds.box.contains(view.camera.pose.centre);
   });
@@ -117,6 +114,7 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
     throw_invalid("--voxel-size",
                   std::to_string(longest / scene.voxel_size) + " voxels along the longest side",
                   "at most 65536");
+  scene.warnings = scale_warnings(dataset, scene.bounds, scene.voxel_size);
   scene.notes.push_back("bounds: " + scene.bounds.how);
   scene.transform =
       ColorTransform(options.color_space, parse_white_point(options.white_point, "--white-point"));

@@ -16,7 +16,8 @@ struct Scene {
   double exposure = 1;            ///< radiance that counts as display white; 1 for 8- and 16-bit images
   MatchModel model;
   Background background;
-  std::vector<std::string> notes;  ///< what was chosen and why, for people
+  std::vector<std::string> notes;     ///< what was chosen and why, for people
+  std::vector<std::string> warnings;  ///< what is likely to be a mistake, and what to change
 };
 
 /// Reads every image once. Throws InvalidInput for options that do not fit the data set.
@@ -27,7 +28,7 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
 /// `load` is given). For `roxel info` and dry runs, and the first step of survey().
 Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options);
 
-/// The frames of a level's lattices: box first, then surround. `level` is 0 for the coarsest.
+/// The frames of the coarsest level's lattices: box first, then surround.
 std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options);
 
 /// Loads all views, and prepares their samples for voxels of `voxel_size`.
