@@ -3,14 +3,14 @@
 # sudo it installs them; otherwise it prints the one command to run and fails.
 #
 #     tools/setup.sh        what `make test` and `make demo` need
-#     tools/setup.sh dev    and what contributors need besides (format, lint, benchmarks, faster rebuilds)
+#     tools/setup.sh dev    and what contributors need besides (format, lint, faster rebuilds)
 set -eu
 
 build="g++ cmake ninja-build python3
   libopenvdb-dev libboost-iostreams-dev zlib1g-dev libtbb-dev libeigen3-dev
   libopenimageio-dev openimageio-tools
-  nlohmann-json3-dev libcli11-dev libgtest-dev libgmock-dev librapidcheck-dev"
-dev="clang-format clang-tidy ccache libbenchmark-dev libopenvdb-tools"
+  nlohmann-json3-dev libcli11-dev libgtest-dev libgmock-dev librapidcheck-dev libopenvdb-tools"
+dev="clang-format clang-tidy ccache"
 
 wanted=$build
 if [ "${1:-}" = dev ]; then wanted="$build $dev"; fi

@@ -61,9 +61,10 @@ void ViewWriter::write(const ViewResult& result) {
   ImageError error;
   if (!result.depth.opacity.empty()) figures.depth_share = share_opaque(result.depth.opacity);
   if (!result.rendering.rgb.empty()) {
-    const Image& opacity = result.depth.opacity.empty() ? result.rendering.opacity : result.depth.opacity;
+    // Not the depth map's opacity: that has seen the photograph, and is low where the volume explains it
+    // badly.
     error = image_error(in_whites(result.rendering.rgb, white_), in_whites(result.photo.rgb, white_),
-                        object_mask(result.photo, opacity));
+                        object_mask(result.photo, result.rendering.opacity));
     figures.reprojection_rms = error.rms_percent();
     figures.object_pixels = error.pixel_count;
   }

@@ -91,6 +91,14 @@ void choose_automatically(const std::vector<std::array<float, 3>>& colors, Scene
   scene.background.kind = BackgroundKind::kUnknown;
 }
 
+/// A colour that is given is meant to be used.
+BackgroundChoice chosen_kind(const ReconstructOptions& options) {
+  if (!options.background_color || options.background == BackgroundChoice::kConstant)
+    return options.background;
+  if (options.background == BackgroundChoice::kAuto) return BackgroundChoice::kConstant;
+  throw_invalid("--background-color", "another --background", "--background constant, or none given");
+}
+
 }  // namespace
 
 BorderSample sample_border(const Photograph& photo) {
@@ -122,7 +130,7 @@ void choose_background(const std::vector<BorderSample>& borders, const Reconstru
     }
   }
   Background& background = scene.background;
-  switch (options.background) {
+  switch (chosen_kind(options)) {
     case BackgroundChoice::kNone:
       background.kind = BackgroundKind::kNone;
       return;

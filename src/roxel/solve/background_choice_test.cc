@@ -122,6 +122,20 @@ TEST(BackgroundChoice, WhatIsAskedForIsObeyed) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(constant.background.mean[c], luv({0.1f, 0.2f, 0.8f})[c], 1e-3);
 }
 
+TEST(BackgroundChoice, AColorMeansAConstantAndNothingElse) {
+  const std::vector<Photograph> photos{photo_of({0.3f, 0.5f, 0.2f}, {1, 0, 0}, true), textured_photo(4)};
+  ReconstructOptions options = with(BackgroundChoice::kAuto);
+  options.background_color = {0.1, 0.2, 0.8};
+  const Scene implied = chosen(photos, options);
+  EXPECT_EQ(implied.background.kind, BackgroundKind::kKnown);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(implied.background.mean[c], luv({0.1f, 0.2f, 0.8f})[c], 1e-3);
+  for (const BackgroundChoice other : {BackgroundChoice::kNone, BackgroundChoice::kUnknown,
+                                       BackgroundChoice::kBlack, BackgroundChoice::kMask}) {
+    options.background = other;
+    EXPECT_THROW(chosen(photos, options), InvalidInput);
+  }
+}
+
 TEST(BackgroundChoice, AConstantIsEstimatedFromTheBordersWhereNoneIsGiven) {
   const Scene scene =
       chosen({photo_of({0.3f, 0.5f, 0.2f}, {1, 0, 0}, false)}, with(BackgroundChoice::kConstant));

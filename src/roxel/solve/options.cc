@@ -90,7 +90,7 @@ void add_color(OptionTable<Options>& table) {
   table.add("noise", &Options::noise)
       .help("Standard deviation of colour that is always granted")
       .unit("units of the colour space")
-      .above(0)
+      .range(1e-4, 1000)
       .unset("3 in Luv, the same share of the gamut elsewhere");
   table
       .add("agreement", &Options::agreement,
@@ -128,7 +128,7 @@ void add_background(OptionTable<Options>& table) {
             {"mask", BackgroundChoice::kMask}})
       .help("What a ray sees that passes every voxel");
   table.add("background-color", &Options::background_color)
-      .help("Colour of a constant background: linear r,g,b")
+      .help("Colour of a constant background, which it implies: linear r,g,b")
       .unset("estimated from the images' borders");
   table.add("filter-rays", &Options::filter_rays)
       .help("Remove what a voxel explains from the sample behind it")

@@ -109,6 +109,10 @@ bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions
         [&](double fraction) { progress.report(level, pass, fraction); }, volume,
         last ? nullptr : &acceleration);
     summary.passes.push_back(make_record(level, pass, draft, volume, report, seconds_since(start)));
+    if (!std::isfinite(report.opacity.log_likelihood))
+      throw NumericalError("level " + std::to_string(level) + ", pass " + std::to_string(pass) +
+                           ": the log-likelihood is not finite; --noise, --outlier or --uninformative are "
+                           "far from what colours are like");
     if (hooks.after_pass) hooks.after_pass(summary.passes.back());
     const bool rests = report.update.mean_opacity_change < options.tolerance;
     if (last) return resting || rests;

@@ -166,6 +166,40 @@ TEST(Reconstruct, AccelerationIsAheadOfPlainPasses) {
 }
 
 // What a run leaves is an EM step: the sums that merge adds up again.
+TEST(Reconstruct, ABoxThatNoRayMeetsIsAnError) {
+  ReconstructOptions options = cube_options();
+  options.bounds = {100, 100, 100, 101, 101, 101};
+  RunContext context(1);
+  EXPECT_THROW(reconstruct(cube_dataset(4, 16), cube_loader(), options, context), InvalidInput);
+}
+
+TEST(Reconstruct, SaysWhatWasSurveyedBeforeTheFirstPass) {
+  Dataset dataset = cube_dataset(4, 16);
+  dataset.notes = {"a note of the reader"};
+  ReconstructOptions options = cube_options();
+  options.voxel_size = 1e-3;  // far below a pixel
+  options.levels = 7;
+  options.passes = 1;
+  std::vector<std::string> order, warnings;
+  ReconstructHooks hooks;
+  hooks.after_survey = [&](const Scene& scene) {
+    order.push_back("survey");
+    warnings = scene.warnings;
+  };
+  hooks.after_pass = [&](const PassRecord&) {
+    order.push_back("pass");
+    throw Cancelled();
+  };
+  RunContext context(1);
+  EXPECT_THROW(reconstruct(dataset, cube_loader(), options, context, hooks), Cancelled);
+  EXPECT_EQ(order, (std::vector<std::string>{"survey", "pass"}));
+  EXPECT_FALSE(warnings.empty());
+  options = cube_options();
+  options.passes = 1;
+  EXPECT_EQ(reconstruct(dataset, cube_loader(), options, context).summary.notes.front(),
+            "a note of the reader");
+}
+
 TEST(Reconstruct, TheLastPassOfALevelIsPlain) {
   const auto only_pass = [](double acceleration) {
     ReconstructOptions options = cube_options();

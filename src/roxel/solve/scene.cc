@@ -90,6 +90,21 @@ Image matching_image(const Photograph& photo, const Scene& scene) {
   return samples;
 }
 
+/// Every level's lattice is that of the coarsest, divided: with many levels its bricks reach far out of the
+/// box.
+void check_levels(const Scene& scene, const ReconstructOptions& options) {
+  constexpr double kMostBricks = 1 << 28;
+  const double coarsest = std::ldexp(scene.voxel_size, options.levels - 1);
+  const Eigen::Vector3d bricks =
+      nested_frames(scene.bounds.box, coarsest, 0)[0].size_in_bricks.cast<double>() *
+      std::ldexp(1.0, options.levels - 1);
+  if (bricks.prod() > kMostBricks)
+    throw_invalid(
+        "--levels",
+        std::to_string(options.levels) + " levels down to voxels of " + std::to_string(scene.voxel_size),
+        "at most 2^28 bricks of 8^3 voxels at the finest level: fewer levels, or larger voxels");
+}
+
 /// Width of a voxel in pixels at the depth of the box's centre (or half way to far, from inside the box).
 double footprint_px(const PinholeCamera& camera, const Scene& scene, double voxel_size,
                     const Stretch& range) {
@@ -114,6 +129,7 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
     throw_invalid("--voxel-size",
                   std::to_string(longest / scene.voxel_size) + " voxels along the longest side",
                   "at most 65536");
+  check_levels(scene, options);
   scene.warnings = scale_warnings(dataset, scene.bounds, scene.voxel_size);
   scene.notes.push_back("bounds: " + scene.bounds.how);
   scene.transform =

@@ -37,6 +37,24 @@ TEST(Survey, TakesTheGivenBoxAndItsVoxelSize) {
   EXPECT_DOUBLE_EQ(surveyed(options, cube_loader()).voxel_size, 0.03);
 }
 
+TEST(Survey, WarnsOfABoxThatNoCameraSees) {
+  EXPECT_THAT(surveyed(cube_options(), cube_loader()).warnings, ::testing::IsEmpty());
+  ReconstructOptions options = cube_options();
+  options.bounds = {100, 100, 100, 101, 101, 101};
+  EXPECT_THAT(surveyed(options, cube_loader()).warnings, ::testing::Not(::testing::IsEmpty()));
+}
+
+TEST(Survey, RefusesMoreLevelsThanTheFinestLatticeHasRoomFor) {
+  ReconstructOptions options = cube_options();
+  options.levels = 16;
+  try {
+    surveyed(options, cube_loader());
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr("--levels"));
+  }
+}
+
 TEST(Survey, RefusesAbsurdVoxelSizes) {
   ReconstructOptions options = cube_options();
   options.voxel_size = 1e-6;

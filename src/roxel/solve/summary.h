@@ -38,7 +38,7 @@ struct StageRecord {
 };
 
 struct Summary {
-  std::string termination;  ///< "converged", "pass limit" or "interrupted"
+  std::string termination;  ///< "converged" or "pass limit"
   std::vector<LevelRecord> levels;
   std::vector<PassRecord> passes;
   std::vector<StageRecord> stages;
