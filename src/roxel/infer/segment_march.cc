@@ -165,8 +165,8 @@ void EvaluatedSteps::append(const StepChunk& chunk, const MatchBlock& block, int
     const std::size_t room = 2 * (size_ + StepChunk::kSize);
     slot_.resize(room);
     for (std::vector<float>& field : field_) field.resize(room);
-    if (with_depths) depth_.resize(room);
   }
+  if (with_depths && depth_.size() < slot_.size()) depth_.resize(slot_.size());
   std::copy_n(chunk.slot, count, slot_.data() + size_);
   std::copy_n(chunk.length, count, field_[kLength].data() + size_);
   std::copy_n(chunk.weight, count, field_[kWeight].data() + size_);
