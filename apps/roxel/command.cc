@@ -104,8 +104,7 @@ ParsedLine parse_line(const CommandForm& form, const std::deque<OptionField>& fi
   for (const CLI::Option* option : app.parse_order()) {
     const auto name = names.find(option);
     if (name == names.end()) continue;
-    const bool is_switch = option->get_expected_max() == 0;
-    parsed.options.emplace_back(name->second, is_switch ? "" : option->results().back());
+    parsed.options.emplace_back(name->second, option->results().back());  // "true" for a bare switch
   }
   return parsed;
 }

@@ -70,24 +70,26 @@ void write_view(const fs::path& folder, const PhotographLoader& load, View& view
 }
 
 int run_convert(const Invocation& invocation, const ConvertOptions& options) {
-  Input input = read_input(invocation.inputs.front(), options.input);
-  if (fs::exists(invocation.output) && fs::equivalent(invocation.output, invocation.inputs.front()))
-    throw_invalid("-o", "the data set itself", "another folder");
-  const OutputFolder folder(invocation.output);
   Session session(options.common);
+  Input input = read_input(invocation.inputs.front(), options.input, session);
+  protect_sources(invocation.output, {{}, &input.dataset});
+  const OutputFolder folder(invocation.output);
+  PartialResults results(folder.path());
   std::atomic<int> done{0};
   parallel_for(input.dataset.views.size(), session.context().thread_count(), [&](std::int64_t v, int) {
     session.context().throw_if_cancelled();
-    write_view(invocation.output, input.load, input.dataset.views[v]);
+    write_view(results.path(), input.load, input.dataset.views[v]);
     Progress progress;
     progress.stage = "convert";
     progress.fraction = ++done / static_cast<double>(input.dataset.views.size());
     session.context().report(progress);
   });
   if (options.to == Target::kColmap)
-    write_colmap_text(input.dataset, invocation.output);
+    write_colmap_text(input.dataset, results.path());
   else
-    write_transforms(input.dataset, invocation.output);
+    write_transforms(input.dataset, results.path());
+  session.context().throw_if_cancelled();
+  results.publish();
   session.display().clear();
   const nlohmann::ordered_json json{{"dataset", invocation.output.string()},
                                     {"images", input.dataset.views.size()}};

@@ -169,9 +169,11 @@ std::string metrics_text(const FinishedRun& run, const Metrics& metrics) {
 }
 
 int run_eval(const Invocation& invocation, const EvalOptions& options) {
+  Session session(options.common);
   const FinishedRun run = read_run(invocation.inputs.front());
   const std::optional<fs::path> truth = truth_folder(options, run);
-  Session session(options.common);
+  session.context().throw_if_cancelled();
+  if (!invocation.output.empty()) protect_sources(invocation.output, {{run.path, truth.value_or(run.path)}});
   Metrics metrics;
   if (truth) measure_depth(run, *truth, session.context(), metrics);
   take_reprojection(run, metrics);

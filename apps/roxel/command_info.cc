@@ -21,9 +21,8 @@ OptionTable<InfoOptions> info_table() {
 }
 
 int run_info(const Invocation& invocation, const InfoOptions& options) {
-  Input input = read_input(invocation.inputs.front(), options.input);
   Session session(options.common);
-  input.load = session.cancellable(input.load);
+  const Input input = read_input(invocation.inputs.front(), options.input, session);
   const Description description = describe(input, options.reconstruct, session.context());
   print_result(options.common, description.text, json_text(description.json));
   return 0;

@@ -96,27 +96,40 @@ float used_number(const FinishedRun& run, const char* option) {
   return used.is_number() ? used.get<float>() : 0;
 }
 
+std::vector<FinishedRun> read_runs(const std::vector<std::string>& paths, const RunContext& context) {
+  std::vector<FinishedRun> runs;
+  for (const std::string& path : paths) {
+    runs.push_back(read_run(path));
+    context.throw_if_cancelled();
+  }
+  return runs;
+}
+
 int run_merge(const Invocation& invocation, const MergeCommandOptions& options) {
   if (invocation.inputs.size() < 2) throw InvalidInput("merge: found 1 run, expected at least 2");
-  std::vector<FinishedRun> runs;
-  for (const std::string& path : invocation.inputs) runs.push_back(read_run(path));
-  check_compatible(runs);
-  const OutputFolder folder(invocation.output);
   Session session(options.common);
+  const std::vector<FinishedRun> runs = read_runs(invocation.inputs, session.context());
+  check_compatible(runs);
+  Sources sources;
+  for (const FinishedRun& run : runs) sources.folders.push_back(run.path);
+  protect_sources(invocation.output, sources);
+  const OutputFolder folder(invocation.output);
   std::vector<const Volume*> volumes;
   for (const FinishedRun& run : runs) volumes.push_back(&run.file.volume);
   const Volume merged = merge(volumes, merge_options(runs.front()), session.context().thread_count());
   session.context().throw_if_cancelled();
-  remove_results(invocation.output);
+  PartialResults results(folder.path());
   const VolumeInfo& info = runs.front().file.info;
-  write_volume(invocation.output / "volume.vdb", merged, info, SavedLattices::kAll);
+  write_volume(results.path() / "volume.vdb", merged, info, SavedLattices::kAll);
   write_voxels_ply(
-      invocation.output / "voxels.ply", merged, info.colors,
+      results.path() / "voxels.ply", merged, info.colors,
       static_cast<float>(options.opacity_threshold.value_or(used_number(runs.front(), "opacity-threshold"))),
       used_number(runs.front(), "confidence-threshold"));
   session.context().throw_if_cancelled();
   const std::string json = json_text(merged_summary(invocation, runs, merged));
-  write_text_atomically(invocation.output / "summary.json", json + "\n");
+  write_text_atomically(results.path() / "summary.json", json + "\n");
+  session.context().throw_if_cancelled();
+  results.publish([&] { remove_results(folder.path()); });
   print_result(options.common,
                std::to_string(runs.size()) + " runs, " + std::to_string(merged.box_slot_count()) +
                    " voxels, written to " + invocation.output.string() + "\n",

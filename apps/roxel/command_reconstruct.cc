@@ -119,80 +119,95 @@ class Run {
   Run(const Invocation& invocation, const RunOptions& options)
       : invocation_(invocation),
         options_(options),
-        input_(read_input(invocation.inputs.front(), options.input)) {}
+        session_(options.common),
+        input_(read_input(invocation.inputs.front(), options.input, session_)) {}
 
   int execute() {
     if (options_.stages.dry_run) return describe_only();
     if (invocation_.output.empty()) throw InvalidInput("-o RUN is missing; see roxel reconstruct --help");
     std::optional<VolumeFile> initial;
     if (options_.stages.init) initial = read_initial(*options_.stages.init, options_.reconstruct);
+    session_.context().throw_if_cancelled();
+    protect_sources(invocation_.output, sources());
     const OutputFolder folder(invocation_.output);
     for (const std::string& warning : input_.dataset.warnings) warn(options_.common, warning);
-    Session session(options_.common);
-    input_.load = session.cancellable(input_.load);
-    hashes_ = hash_images(input_.dataset, session.context());
+    hashes_ = hash_images(input_.dataset, session_.context());
     stopwatch_.lap();
-    make_volume(session, initial ? &initial->volume : nullptr);
+    make_volume(initial ? &initial->volume : nullptr);
     if (initial && initial->info.exposure != made_.scene.exposure)
       warn(options_.common,
            "--init: that run has another exposure, so its colours are brighter or darker than here");
-    remove_results(invocation_.output);
-    write_volume_files(session);
-    write_views(session);
-    session.context().throw_if_cancelled();
-    finish(session);
+    write_results(folder.path());
     return 0;
   }
 
  private:
+  Sources sources() const {
+    Sources read;
+    read.dataset = &input_.dataset;
+    if (options_.stages.init) read.folders.push_back(*options_.stages.init);
+    return read;
+  }
+
   int describe_only() {
-    Session session(options_.common);
-    input_.load = session.cancellable(input_.load);
-    const Description description = describe(input_, options_.reconstruct, session.context());
-    session.display().clear();
+    const Description description = describe(input_, options_.reconstruct, session_.context());
+    session_.display().clear();
     print_result(options_.common, description.text, json_text(description.json));
     return 0;
   }
 
-  void make_volume(Session& session, const Volume* initial) {
+  void make_volume(const Volume* initial) {
     ReconstructHooks hooks;
     hooks.initial = initial;
     hooks.after_survey = [&](const Scene& scene) {
       for (const std::string& warning : scene.warnings) warn(options_.common, warning);
     };
     hooks.after_pass = [&](const PassRecord& record) {
-      session.display().line(pass_text(record, options_.reconstruct));
+      session_.display().line(pass_text(record, options_.reconstruct));
     };
-    made_ = reconstruct(input_.dataset, input_.load, options_.reconstruct, session.context(), hooks,
+    made_ = reconstruct(input_.dataset, input_.load, options_.reconstruct, session_.context(), hooks,
                         kVolumeShare);
     stopwatch_.lap();
   }
 
-  void write_volume_files(Session& session) {
-    report(session, "writing", kVolumeShare);
+  /// A finished run is replaced as a whole; where there is none, what is written stays even if a later stage
+  /// fails, since others can go on from a volume.
+  void write_results(const std::filesystem::path& folder) {
+    std::optional<PartialResults> partial;
+    if (std::filesystem::exists(folder / "summary.json")) partial.emplace(folder);
+    const std::filesystem::path& results = partial ? partial->path() : folder;
+    write_volume_files(results);
+    write_views(results);
+    session_.context().throw_if_cancelled();
+    const std::string json = write_summary(results);
+    if (partial) partial->publish([&] { remove_results(folder); });
+    say_results(json);
+  }
+
+  void write_volume_files(const std::filesystem::path& results) {
+    report("writing", kVolumeShare);
     VolumeInfo info;
     info.colors = made_.scene.transform;
     info.exposure = made_.scene.exposure;
     info.dataset = input_.dataset.path;
-    write_volume(invocation_.output / "volume.vdb", made_.volume, info,
+    write_volume(results / "volume.vdb", made_.volume, info,
                  options_.stages.save_surround ? SavedLattices::kAll : SavedLattices::kBoxOnly);
-    session.context().throw_if_cancelled();
-    write_voxels_ply(invocation_.output / "voxels.ply", made_.volume, made_.scene.transform,
+    session_.context().throw_if_cancelled();
+    write_voxels_ply(results / "voxels.ply", made_.volume, made_.scene.transform,
                      static_cast<float>(options_.reconstruct.opacity_threshold),
                      static_cast<float>(options_.reconstruct.confidence_threshold));
-    session.context().throw_if_cancelled();
+    session_.context().throw_if_cancelled();
     made_.summary.stages.push_back({"write volume", stopwatch_.lap()});
-    report(session, "writing", kVolumeWritten);
+    report("writing", kVolumeWritten);
   }
 
-  void write_views(Session& session) {
-    ViewWriter writer(invocation_.output, input_.dataset, made_.scene.exposure,
-                      picture_response(input_, made_.scene));
+  void write_views(const std::filesystem::path& results) {
+    ViewWriter writer(results, input_.dataset, made_.scene.exposure, picture_response(input_, made_.scene));
     ViewStageOptions stages;
     stages.depth = options_.stages.depth;
     stages.render = options_.stages.render;
     stages.progress_begin = kVolumeWritten;
-    for_each_view_result(input_.dataset, input_.load, made_, options_.reconstruct, stages, session.context(),
+    for_each_view_result(input_.dataset, input_.load, made_, options_.reconstruct, stages, session_.context(),
                          [&](const ViewResult& result) { writer.write(result); });
     writer.write_overview();
     views_ = writer.figures();
@@ -201,15 +216,19 @@ class Run {
       made_.summary.stages.push_back({"depth and pictures", stopwatch_.lap()});
   }
 
-  void finish(Session& session) {
+  std::string write_summary(const std::filesystem::path& results) {
     made_.summary.seconds = stopwatch_.total();
     made_.summary.peak_memory_bytes = peak_memory_bytes();
-    const std::string json = json_text(to_json(make_record(session.context().thread_count())));
-    write_text_atomically(invocation_.output / "summary.json", json + "\n");
-    for (const std::string& note : made_.summary.notes) session.display().detail(note);
+    const std::string json = json_text(to_json(make_record(session_.context().thread_count())));
+    write_text_atomically(results / "summary.json", json + "\n");
+    return json;
+  }
+
+  void say_results(const std::string& json) {
+    for (const std::string& note : made_.summary.notes) session_.display().detail(note);
     for (const StageRecord& stage : made_.summary.stages)
-      session.display().detail(stage.name + ": " + duration_text(stage.seconds));
-    session.display().clear();
+      session_.display().detail(stage.name + ": " + duration_text(stage.seconds));
+    session_.display().clear();
     print_result(options_.common, brief(), json);
   }
 
@@ -245,15 +264,16 @@ class Run {
     return text + "written to " + invocation_.output.string() + "\n";
   }
 
-  static void report(Session& session, const char* stage, double fraction) {
+  void report(const char* stage, double fraction) {
     Progress progress;
     progress.stage = stage;
     progress.fraction = fraction;
-    session.context().report(progress);
+    session_.context().report(progress);
   }
 
   const Invocation& invocation_;
   const RunOptions& options_;
+  Session session_;
   Input input_;
   std::vector<std::string> hashes_;
   Stopwatch stopwatch_;

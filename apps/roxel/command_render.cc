@@ -81,18 +81,19 @@ void write_planes(const std::filesystem::path& folder, const std::string& name, 
   write_exr(view_path(folder, "render", name, ".exr").string(), channels);
 }
 
-Input read_cameras(const FinishedRun& run, const RenderCommandOptions& options) {
-  if (options.cameras) return read_input(*options.cameras, options.input);
+Input read_cameras(const FinishedRun& run, const RenderCommandOptions& options, const Session& session) {
+  if (options.cameras) return read_input(*options.cameras, options.input, session);
   if (run.file.info.dataset.empty())
     throw_invalid(run.path.string(), "a run that names no data set", "--cameras DATASET");
-  return read_input(run.file.info.dataset, options.input);
+  return read_input(run.file.info.dataset, options.input, session);
 }
 
 int run_render(const Invocation& invocation, const RenderCommandOptions& options) {
-  const FinishedRun run = read_run(invocation.inputs.front());
-  const Input input = read_cameras(run, options);
-  const OutputFolder folder(invocation.output);
   Session session(options.common);
+  const FinishedRun run = read_run(invocation.inputs.front());
+  const Input input = read_cameras(run, options, session);
+  protect_sources(invocation.output, {{run.path}, &input.dataset});
+  const OutputFolder folder(invocation.output);
   const Volume& volume = run.file.volume;
   const LatticeStack stack(volume);
   const auto colors = radiance_colors(volume, run.file.info.colors, 1);

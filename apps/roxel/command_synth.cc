@@ -64,8 +64,8 @@ int run_synth(const Invocation& invocation, const SynthOptions& options) {
   if (name != "demo") throw_invalid("world", "\"" + name + "\"", "demo");
   DemoWorldOptions world = options.world;
   parse_size(options.size, world.width, world.height);
-  const OutputFolder folder(invocation.output);
   Session session(options.common);
+  const OutputFolder folder(invocation.output);
   write_demo_world(invocation.output, world, writers(), session.context());
   session.display().clear();
   const nlohmann::ordered_json json{{"world", name},

@@ -5,7 +5,7 @@
 
 #include <atomic>
 #include <cstdio>
-#include <fstream>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "roxel/base/error.h"
@@ -85,7 +85,7 @@ const OptionTable<InputOptions>& input_option_table() {
   return table;
 }
 
-Input read_input(const std::string& path, const InputOptions& options) {
+Input read_input(const std::string& path, const InputOptions& options, const Session& session) {
   ReadOptions read;
   if (options.format != "auto") read.format = options.format;
   read.images = options.images.value_or("");
@@ -98,7 +98,8 @@ Input read_input(const std::string& path, const InputOptions& options) {
   PhotographOptions photograph;
   photograph.response = input.response;
   if (options.masks == "none") photograph.masks = MaskUse::kNone;
-  input.load = make_photograph_loader(photograph);
+  input.load = session.cancellable(make_photograph_loader(photograph));
+  session.context().throw_if_cancelled();
   return input;
 }
 
@@ -132,30 +133,6 @@ std::string json_text(const nlohmann::ordered_json& json) {
 void print_result(const CommonOptions& options, const std::string& text, const std::string& json) {
   if (options.json) std::printf("%s\n", json.c_str());
   if (!options.json && !options.quiet) std::fputs(text.c_str(), stdout);
-}
-
-OutputFolder::OutputFolder(fs::path path) : path_(std::move(path)) {
-  std::vector<fs::path> missing;
-  std::error_code error;
-  for (fs::path folder = fs::absolute(path_).lexically_normal();
-       !fs::exists(folder, error) && folder.has_relative_path(); folder = folder.parent_path())
-    if (folder.has_filename()) missing.push_back(folder);
-  fs::create_directories(path_, error);
-  if (error || !fs::is_directory(path_)) {
-    const std::string why = error ? error.message() : "it is not a folder";
-    throw IoError(path_.string() + ": cannot be made: " + why);
-  }
-  made_.assign(missing.rbegin(), missing.rend());
-  const fs::path probe = path_ / (".roxel-probe-" + std::to_string(getpid()));
-  const bool written = static_cast<bool>(std::ofstream(probe) << "x" << std::flush);
-  fs::remove(probe, error);
-  if (!written) throw IoError(path_.string() + ": cannot be written to");
-}
-
-OutputFolder::~OutputFolder() {
-  std::error_code error;
-  for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder)
-    if (!fs::is_empty(*folder, error) || error || !fs::remove(*folder, error)) return;
 }
 
 }  // namespace roxel::cli

@@ -1,12 +1,12 @@
 #pragma once
 /// What several commands share: common options, how a data set is read, and the frame around a long job.
 
-#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "output_folder.h"
 #include "progress_display.h"
 #include "roxel/base/option_table.h"
 #include "roxel/base/run_context.h"
@@ -42,9 +42,8 @@ struct Input {
   std::optional<Response> response;  ///< where it was chosen
 };
 
-Input read_input(const std::string& path, const InputOptions& options);
-
-/// Progress, Ctrl-C and messages around a long job. One at a time.
+/// Progress, Ctrl-C and messages around a long job. One at a time; the first thing that a command makes, so
+/// that Ctrl-C always ends it in order.
 class Session {
  public:
   explicit Session(const CommonOptions& options);
@@ -53,6 +52,7 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   RunContext& context() { return context_; }
+  const RunContext& context() const { return context_; }
   ProgressDisplay& display() { return display_; }
   /// The loader, but it throws Cancelled after Ctrl-C: for work that looks at images and knows no context.
   PhotographLoader cancellable(PhotographLoader load) const;
@@ -62,6 +62,9 @@ class Session {
   RunContext context_;
 };
 
+/// Its loader throws Cancelled after Ctrl-C, as this does; `session` must outlive it.
+Input read_input(const std::string& path, const InputOptions& options, const Session& session);
+
 /// A warning for people on stderr, unless --quiet.
 void warn(const CommonOptions& options, const std::string& message);
 
@@ -70,21 +73,5 @@ std::string json_text(const nlohmann::ordered_json& json);
 
 /// Text on stdout at the end of a command: `json` with --json, else `text` unless --quiet.
 void print_result(const CommonOptions& options, const std::string& text, const std::string& json);
-
-/// A folder that results go to. It is made, and tried by writing, before any long work; folders that were
-/// made and are still empty in the end are removed.
-class OutputFolder {
- public:
-  /// Throws IoError.
-  explicit OutputFolder(std::filesystem::path path);
-  ~OutputFolder();
-  OutputFolder(const OutputFolder&) = delete;
-  OutputFolder& operator=(const OutputFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-  std::vector<std::filesystem::path> made_;  ///< outermost first
-};
 
 }  // namespace roxel::cli

@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -106,7 +107,8 @@ class Usage(Case):
             ("--size", ["synth", "demo", "-o", out, "--size", "64"]),
             ("--images: found", ["synth", "demo", "-o", out, "--images", "1"]),
             ("--to: found", ["convert", self.data, "-o", out, "--to", "bundler"]),
-            ("the data set itself", ["convert", self.data, "-o", self.data]),
+            ('--depth: found "maybe"', ["reconstruct", self.data, "-o", out, "--depth=maybe"]),
+            ('--no-adaptive: found "2"', ["info", self.data, "--no-adaptive=2"]),
         ]
         for message, arguments in table:
             with self.subTest(message):
@@ -127,14 +129,17 @@ class Usage(Case):
             self.assertIn(f"\n  {command} ", self.succeed("--help").stdout)
         self.assertRegex(self.succeed("--version").stdout, r"^roxel \d+\.\d+\.\d+$")
 
-    def test_an_output_that_cannot_be_written_fails_with_code_1_before_the_work(self):
+    def test_a_file_in_the_place_of_the_output_ends_with_code_2_before_the_work(self):
         blocker = self.folder / "blocker"
         blocker.write_text("a file")
         for command in (["reconstruct", self.data], ["synth", "demo"], ["convert", self.data]):
             with self.subTest(command[0]):
-                self.expect_error(1, "cannot be made", *command, "-o", blocker / "run")
-                self.expect_error(1, "cannot be made", *command, "-o", blocker)
+                self.expect_error(2, f"found a file, {blocker}", *command, "-o", blocker / "run")
+                self.expect_error(2, f"found a file, {blocker}", *command, "-o", blocker)
         self.assertEqual(blocker.read_text(), "a file")
+
+    def test_an_output_that_cannot_be_written_fails_with_code_1_before_the_work(self):
+        self.expect_error(1, "cannot be made", "synth", "demo", "-o", "/proc/roxel")
 
     def test_a_broken_photograph_ends_with_code_2_and_leaves_no_folder(self):
         broken = self.folder / "broken"
@@ -194,7 +199,7 @@ class Config(Case):
                               ('{"near": 3, "far": 2}', "--near must be below --far")]:
             with self.subTest(text):
                 self.expect_error(2, message, "reconstruct", self.data, "-o", out, "--config", self.config(text))
-        self.expect_error(1, "missing.json", "reconstruct", self.data, "-o", out, "--config", self.folder / "missing.json")
+        self.expect_error(2, "missing.json: found no such file", "reconstruct", self.data, "-o", out, "--config", self.folder / "missing.json")
         self.assertFalse(out.exists())
 
 
@@ -306,6 +311,12 @@ class Switches(Case):
         self.assertEqual(files_below(out / "error"), [f"00{i}.png" for i in range(4)])
         self.assertFalse((out / "depth").exists())
         self.assertLess(summary["reprojection_rms_percent"], 40)
+
+    def test_a_switch_takes_a_value(self):
+        _, summary = self.reconstruct("off", "--depth=false", "--no-render=true", "--no-adaptive=on", "--dry-run=0")
+        self.assertEqual([summary["options"][k] for k in ("depth", "render", "adaptive", "dry-run")], [False] * 4)
+        _, summary = self.reconstruct("on", "--no-depth=false", "--no-render", "--no-render=off", "--adaptive=1")
+        self.assertEqual([summary["options"][k] for k in ("depth", "render", "adaptive")], [True] * 3)
 
     def test_surround_is_saved_only_when_asked_for(self):
         plain, _ = self.reconstruct("plain", *UNKNOWN)
@@ -487,6 +498,120 @@ class OtherCommands(Case):
         self.assertNotEqual(worlds["a"]["images/000.png"], worlds["c"]["images/000.png"])
 
 
+def digests(folder):
+    return {f: digest(pathlib.Path(folder) / f) for f in files_below(folder)}
+
+
+def run_on_a_full_disc(*arguments, most_bytes):
+    """Runs roxel where files cannot grow beyond a size; what it said."""
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+    return run(*arguments, preexec_fn=limit, restore_signals=False)
+
+
+class Safety(Case):
+    """Sources are never written over, and older results only by whole new ones."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        for name in ("one", "two"):
+            done = run("reconstruct", cls.data, "-o", cls.folder / name, *TINY)
+            assert done.returncode == 0, done.stderr
+        cls.link = cls.folder / "link"
+        cls.link.symlink_to(cls.data)
+        (cls.folder / "link-to-one").symlink_to(cls.folder / "one")
+
+    def refuse(self, message, *arguments):
+        before = digests(self.folder)
+        with self.subTest(" ".join(map(str, arguments))):
+            self.expect_error(2, message, *arguments)
+            self.assertEqual(digests(self.folder), before)
+
+    def test_a_data_set_is_no_output(self):
+        for command in ("reconstruct", "convert"):
+            for out in (self.data, self.link, self.data / "images/..", self.folder / "missing/../link"):
+                self.refuse("the data set itself", command, self.data, "-o", out)
+            self.refuse("the data set itself", command, self.data / "transforms.json", "-o", self.data)
+            self.refuse("the data set itself", command, self.link / "transforms.json", "-o", self.data)
+        self.refuse("the data set itself", "render", self.folder / "one", "-o", self.data)
+        self.refuse("a folder that is read", "eval", self.folder / "one", "--truth", self.data, "-o", self.link)
+
+    def test_a_folder_with_images_or_masks_in_it_is_no_output(self):
+        for command in ("reconstruct", "convert"):
+            self.refuse("000.png in it", command, self.data, "-o", self.folder)
+            self.refuse("000.png in it", command, self.data, "-o", self.link / "images")
+            self.refuse("000.png in it", command, self.data, "-o", self.data / "mask")
+            self.refuse("000.png in it", command, self.data / "sparse/0", "-o", self.data)
+
+    def test_links_into_the_sources_are_not_written_through(self):
+        for name in ("depth", "images"):
+            out = self.folder / f"with-{name}"
+            out.mkdir()
+            (out / name).symlink_to(self.data / name)
+            self.refuse(f"a link {name}", "reconstruct", self.data, "-o", out)
+            self.refuse(f"a link {name}", "convert", self.data, "-o", out)
+
+    def test_a_run_that_is_read_is_no_output(self):
+        one, two = self.folder / "one", self.folder / "two"
+        for out in (one, self.folder / "link-to-one"):
+            self.refuse("a folder that is read", "merge", one, two, "-o", out)
+            self.refuse("a folder that is read", "merge", two, one, "-o", out)
+            self.refuse("a folder that is read", "render", one, "-o", out)
+            self.refuse("a folder that is read", "eval", one, "-o", out)
+            self.refuse("a folder that is read", "reconstruct", self.data, "-o", out, "--init", one, *TINY)
+
+    def test_a_folder_in_the_data_set_may_be_an_output(self):
+        data = self.folder / "own"
+        shutil.copytree(self.data, data)
+        for _ in range(2):
+            self.succeed("reconstruct", data, "-o", data / "run", *TINY)
+        self.succeed("convert", data, "-o", data / "undistorted")
+
+    def test_a_failing_command_leaves_the_older_run(self):
+        older = self.folder / "older"
+        shutil.copytree(self.folder / "one", older)
+        before = digests(older)
+        size = (older / "volume.vdb").stat().st_size
+        for command in (["reconstruct", self.data, *TINY], ["merge", self.folder / "one", self.folder / "two"]):
+            for most_bytes in (size // 2, size + 1000):
+                with self.subTest(f"{command[0]} {most_bytes}"):
+                    done = run_on_a_full_disc(*command, "-o", older, most_bytes=most_bytes)
+                    self.assertEqual(done.returncode, 1 if most_bytes < size else done.returncode, done.stderr)
+                    if done.returncode != 0:
+                        self.assertEqual(digests(older), before)
+                    self.assertFalse((older / ".partial").exists())
+
+    def test_a_result_in_whose_place_is_a_folder_leaves_the_older_run(self):
+        older = self.folder / "blocked"
+        shutil.copytree(self.folder / "one", older)
+        (older / "depth/000.exr").unlink()
+        (older / "depth/000.exr").mkdir()
+        before = digests(older)
+        self.assertEqual(run("reconstruct", self.data, "-o", older, *TINY, "--quiet").returncode, 1)
+        self.assertEqual(digests(older), before)
+        self.assertFalse((older / ".partial").exists())
+
+    def test_merge_replaces_an_older_run(self):
+        older = self.folder / "merged"
+        shutil.copytree(self.folder / "one", older)
+        self.succeed("merge", self.folder / "one", self.folder / "two", "-o", older)
+        self.assertEqual(files_below(older), ["summary.json", "volume.vdb", "voxels.ply"])
+
+    def test_convert_of_a_broken_image_leaves_nothing(self):
+        broken = self.folder / "broken"
+        shutil.copytree(self.data, broken)
+        (broken / "images/003.png").write_bytes((broken / "images/003.png").read_bytes()[:500])
+        out = self.folder / "deep/converted"
+        self.expect_error(2, "003.png", "convert", broken, "-o", out, "--threads", 1, "--quiet")
+        self.assertFalse((self.folder / "deep").exists())
+        self.succeed("convert", self.data, "-o", out)
+        before = digests(out)
+        self.expect_error(2, "003.png", "convert", broken, "-o", out, "--threads", 1, "--quiet")
+        self.assertEqual(digests(out), before)
+
+
 class Interrupt(Case):
     """Ctrl-C at different moments: code 130 soon, one line, and nothing half-written."""
 
@@ -527,9 +652,45 @@ class Interrupt(Case):
     def test_in_the_passes_leaves_an_older_run_as_it_was(self):
         out = self.folder / "older"
         self.succeed("reconstruct", self.data, "-o", out, *TINY)
-        before = {f: digest(out / f) for f in files_below(out)}
+        before = digests(out)
         self.interrupt(out, "level 1/2 pass 1/", *self.LONG)
-        self.assertEqual({f: digest(out / f) for f in files_below(out)}, before)
+        self.assertEqual(digests(out), before)
+
+    def test_after_the_passes_leaves_an_older_run_as_it_was(self):
+        out = self.folder / "older-late"
+        self.succeed("reconstruct", self.data, "-o", out, *TINY)
+        before = digests(out)
+        self.interrupt(out, "writing", "--resolution", "128", "--levels", "1", "--passes", "1")
+        self.assertEqual(digests(out), before)
+        self.assertFalse((out / ".partial").exists())
+
+    def test_while_a_run_is_read_ends_in_order(self):
+        run_folder = self.folder / "to-read"
+        self.succeed("reconstruct", self.data, "-o", run_folder, *TINY)
+        summary = (run_folder / "summary.json").read_text()
+        (run_folder / "summary.json").unlink()
+        os.mkfifo(run_folder / "summary.json")
+        out = self.folder / "never"
+        for command in (["eval", run_folder], ["render", run_folder], ["merge", run_folder, run_folder]):
+            with self.subTest(command[0]):
+                job = subprocess.Popen([ROXEL, *map(str, command), "-o", str(out)], stderr=subprocess.PIPE, text=True)
+                with open(run_folder / "summary.json", "w") as pipe:  # opens when roxel does
+                    job.send_signal(signal.SIGINT)
+                    pipe.write(summary)
+                self.assertEqual((job.communicate(timeout=60)[1], job.returncode), ("roxel: error: interrupted\n", 130))
+                self.assertFalse(out.exists())
+
+    def test_at_any_early_moment_leaves_no_folder(self):
+        for command in ("reconstruct", "convert"):
+            for delay_ms in range(0, 100, 4):
+                out = self.folder / "early"
+                job = subprocess.Popen([ROXEL, command, str(self.data), "-o", str(out)], stderr=subprocess.DEVNULL,
+                                       stdout=subprocess.DEVNULL)
+                time.sleep(delay_ms / 1000)
+                job.send_signal(signal.SIGINT)
+                if job.wait(timeout=60) == 0:
+                    shutil.rmtree(out)
+                self.assertFalse(out.exists(), f"{command} after {delay_ms} ms")
 
     def test_after_the_passes_leaves_whole_files_and_no_summary(self):
         out = self.folder / "late"

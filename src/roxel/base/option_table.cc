@@ -119,6 +119,9 @@ void OptionTableCore::apply_json(void* options, const json& object, const std::s
 }
 
 void OptionTableCore::apply_json_file(void* options, const std::filesystem::path& file) const {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) && !error)
+    throw_invalid(file.string(), "no such file", "a JSON object of options");
   std::ifstream in(file);
   if (!in) throw IoError(file.string() + ": cannot be read");
   apply_json(options, parse_without_repeated_keys(in, file.string()), file.string());

@@ -222,8 +222,8 @@ class OptionTable {
     options = std::move(changed);
   }
 
-  /// The same from a file. IoError where it cannot be read; InvalidInput for a syntax error or a key that
-  /// stands there twice.
+  /// The same from a file. IoError where it cannot be read; InvalidInput where there is none, for a syntax
+  /// error and for a key that stands there twice.
   void apply_json_file(S& options, const std::filesystem::path& file) const {
     S changed = options;
     core_.apply_json_file(&changed, file);

@@ -291,7 +291,7 @@ TEST(OptionTable, ReadsJsonFiles) {
                 AllOf(HasSubstr(path.string()), HasSubstr(message)));
   }
   std::filesystem::remove(file);
-  EXPECT_THROW(kTable.apply_json_file(options, file), IoError);
+  EXPECT_THAT(rejection([&] { kTable.apply_json_file(options, file); }), HasSubstr("no such file"));
 }
 
 TEST(OptionTable, ValidatesWhatCodeHasSet) {
