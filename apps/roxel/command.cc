@@ -48,6 +48,16 @@ void check_inputs(const CommandForm& form, const std::vector<std::string>& input
     throw_usage(form, "found \"" + inputs[1] + "\" after \"" + inputs[0] + "\", expected one " + form.input);
 }
 
+/// CLI11 takes "--switch=" for "--switch".
+void check_switches(const CommandForm& form, const std::deque<OptionField>& fields,
+                    const std::vector<std::string>& arguments) {
+  for (const OptionField& field : fields)
+    for (const std::string& flag : {"--" + field.name, "--no-" + field.name})
+      for (const std::string& argument : arguments)
+        if (field.is_switch() && (argument == flag + "=" || argument == flag + "={}"))
+          throw_usage(form, flag + ": found \"" + argument + "\", expected true or false");
+}
+
 void declare(CLI::App& app, const std::deque<OptionField>& fields,
              std::map<const CLI::Option*, std::string>& names) {
   for (const OptionField& field : fields) {
@@ -82,6 +92,7 @@ ParsedLine parse_line(const CommandForm& form, const std::deque<OptionField>& fi
   CLI::App app;
   app.set_help_flag();
   app.allow_extras();
+  check_switches(form, fields, arguments);
   std::map<const CLI::Option*, std::string> names;
   declare(app, fields, names);
   app.add_flag("-h,--help", parsed.help);

@@ -108,6 +108,7 @@ class Usage(Case):
             ("--images: found", ["synth", "demo", "-o", out, "--images", "1"]),
             ("--to: found", ["convert", self.data, "-o", out, "--to", "bundler"]),
             ('--depth: found "maybe"', ["reconstruct", self.data, "-o", out, "--depth=maybe"]),
+            ('--dry-run: found "--dry-run="', ["reconstruct", self.data, "-o", out, "--dry-run="]),
             ('--no-adaptive: found "2"', ["info", self.data, "--no-adaptive=2"]),
         ]
         for message, arguments in table:
@@ -573,15 +574,13 @@ class Safety(Case):
         older = self.folder / "older"
         shutil.copytree(self.folder / "one", older)
         before = digests(older)
-        size = (older / "volume.vdb").stat().st_size
+        most_bytes = (older / "voxels.ply").stat().st_size // 2
         for command in (["reconstruct", self.data, *TINY], ["merge", self.folder / "one", self.folder / "two"]):
-            for most_bytes in (size // 2, size + 1000):
-                with self.subTest(f"{command[0]} {most_bytes}"):
-                    done = run_on_a_full_disc(*command, "-o", older, most_bytes=most_bytes)
-                    self.assertEqual(done.returncode, 1 if most_bytes < size else done.returncode, done.stderr)
-                    if done.returncode != 0:
-                        self.assertEqual(digests(older), before)
-                    self.assertFalse((older / ".partial").exists())
+            with self.subTest(command[0]):
+                done = run_on_a_full_disc(*command, "-o", older, most_bytes=most_bytes)
+                self.assertEqual(done.returncode, 1, done.stderr)
+                self.assertEqual(digests(older), before)
+                self.assertFalse((older / ".partial").exists())
 
     def test_a_result_in_whose_place_is_a_folder_leaves_the_older_run(self):
         older = self.folder / "blocked"
