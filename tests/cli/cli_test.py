@@ -212,7 +212,7 @@ CHANGES = {
     "adaptive": (["--samples-per-voxel", "1"], ["--no-adaptive"]),
     "agreement": ([], ["--agreement", "linear"]),
     "agreement-scale": (["--agreement", "exponential"], ["--agreement-scale", "40"]),
-    "all-passes": (["--tolerance", "0.5"], ["--all-passes"]),
+    "all-passes": (["--tolerance", "0.5", "--passes", "6"], ["--all-passes"]),
     "background": (BLACK, ["--background", "none"]),
     "background-color": (BLACK + ["--background", "constant"], ["--background-color", "0.2,0.1,0.4"]),
     "bounds": ([], ["--bounds", "-1,-1,-1,1,1,1"]),
