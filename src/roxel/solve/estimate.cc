@@ -1,7 +1,7 @@
 // The model. A level's voxels: at first, the cells of its lattices that some view sees. Later, sheets around
-// surfaces and what has not been carved yet: on real scenes their number is about 1.8 sqrt(N) times the
-// number of cells in the box's mean cross-section, N being the box's mean side in cells. Rays cross as many
-// of them as lie behind each other, times a share. Everything else is counting bytes and nanoseconds.
+// surfaces and what has not been carved yet: on real scenes about 22 layers of the box's mean cross-section,
+// at any resolution. Rays cross as many of them as lie behind each other, times a share. Everything else is
+// counting bytes and nanoseconds.
 #include "roxel/solve/estimate.h"
 
 #include <algorithm>
@@ -15,13 +15,13 @@ namespace roxel {
 namespace {
 
 // Measured on plane, head, templeSparseRing and dtu-scan24 (with and without masks), at 64 to 256 voxels.
-constexpr double kSheetFactor = 1.8;
-constexpr double kInsideFactor = 3.4;  ///< times that, around cameras that stand in the box (courtyard)
-constexpr double kCrossedShare = 0.4;
+constexpr double kSheetLayers = 22;
+constexpr double kInsideFactor = 4;  ///< times that, around cameras that stand in the box (courtyard)
+constexpr double kCrossedShare = 0.5;
 constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
 constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level
 constexpr double kSurroundShare = 0.15;      ///< of the box's voxels, for each surround lattice
-constexpr double kSurroundSteps = 2;         ///< more steps a ray for each surround lattice
+constexpr double kSurroundSteps = 4;         ///< more steps a ray for each surround lattice
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
 // Nanoseconds on one core: a ray-voxel step of the colour and the opacity march, loading a pixel.
@@ -38,6 +38,7 @@ constexpr double kKeptShare = 0.6;  ///< of the voxels, for each node
 constexpr double kVoxelsPerBrick = 150;
 constexpr double kWritingBytesPerBrick = 36 * 1024;
 constexpr double kProgramBytes = 200e6;  ///< libraries
+constexpr double kMemoryMargin = 1.15;   ///< rather too much than too little
 constexpr double kDecodedBytesPerPixel = 40;
 constexpr double kResultBytesPerPixel = 120;  ///< depth map, rendering, pictures
 
@@ -80,22 +81,21 @@ struct BoxVoxels {
   double crossed = 0;
 };
 
-BoxVoxels box_voxels(const Eigen::Vector3d& cells, bool first_level, double sheet_factor) {
+BoxVoxels box_voxels(const Eigen::Vector3d& cells, bool first_level, double layers) {
   const double all = cells.prod();
   const double mean_side = cells.mean();
   const double cross_section = (cells.x() * cells.y() + cells.y() * cells.z() + cells.z() * cells.x()) / 3;
   if (first_level) return {all, kCrossedShare * mean_side};
-  const double behind_each_other = sheet_factor * std::sqrt(mean_side);
-  const double count = std::min(kFilledShare * all, cross_section * behind_each_other);
-  return {count, kCrossedShare * std::min(behind_each_other, mean_side)};
+  const double count = std::min(kFilledShare * all, cross_section * layers);
+  return {count, kCrossedShare * std::min(layers, mean_side)};
 }
 
 LevelEstimate estimate_level(const Scene& scene, double voxel_size, bool first_level, double rays,
-                             double sheet_factor) {
+                             double layers) {
   const Eigen::Vector3d cells =
       nested_frames(scene.bounds.box, voxel_size, scene.surround_count)[0].size_in_voxels().cast<double>();
   const Eigen::Vector3d used = first_level ? cells : Eigen::Vector3d(scene.bounds.box.sizes() / voxel_size);
-  const BoxVoxels box = box_voxels(used, first_level, sheet_factor);
+  const BoxVoxels box = box_voxels(used, first_level, layers);
   LevelEstimate level;
   level.voxel_size = voxel_size;
   const double per_lattice =
@@ -116,7 +116,8 @@ double level_bytes(const LevelEstimate& level, const SampleLoad& load, double la
   const double kept = std::min(static_cast<double>(PassOptions().kept_color_bytes),
                                kKeptShare * nodes * level.voxels * sizeof(OwnColors::Entry));
   const double loading = load.bytes + threads * largest_image * kDecodedBytesPerPixel;
-  return kProgramBytes + volume + std::max({passing + kept, loading, bricks * kWritingBytesPerBrick});
+  const double largest = std::max({passing + kept, loading, bricks * kWritingBytesPerBrick});
+  return kMemoryMargin * (kProgramBytes + volume + largest);
 }
 
 }  // namespace
@@ -128,13 +129,13 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
     all_pixels += pixel_count(view);
     largest_image = std::max(largest_image, pixel_count(view));
   }
-  const double sheet_factor = kSheetFactor * (scene.seen_from_inside ? kInsideFactor : 1);
+  const double layers = kSheetLayers * (scene.seen_from_inside ? kInsideFactor : 1);
   CostEstimate cost;
   double core_ns = all_pixels * kLoadPixelNs;  // survey
   for (int level = 0; level < options.levels; ++level) {
     const double voxel_size = std::ldexp(scene.voxel_size, options.levels - 1 - level);
     const SampleLoad load = sample_load(dataset, scene, voxel_size, options);
-    const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays, sheet_factor);
+    const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays, layers);
     const double colour_marches = options.predictive ? 1.5 : 1;  // most nodes' own colours are kept
     core_ns += all_pixels * kLoadPixelNs;
     const int drafts = std::min(options.draft_passes, options.passes - 1);
