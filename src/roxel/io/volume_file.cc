@@ -270,7 +270,12 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
     }
   write_file_atomically(path, [&](const std::filesystem::path& temporary) {
     try {
-      openvdb::io::File(temporary.string()).write(grids, file_metadata(info, count));
+      // OpenVDB's own files do not say when the disc is full; a stream with exceptions on does.
+      std::ofstream file;
+      file.exceptions(std::ios::failbit | std::ios::badbit);
+      file.open(temporary, std::ios::binary);
+      openvdb::io::Stream(file).write(grids, file_metadata(info, count));
+      file.close();
     } catch (const std::exception& e) {
       throw IoError(path.string() + ": cannot write the volume: " + e.what());
     }
