@@ -1,6 +1,7 @@
 /// roxel merge: joins the volumes of several runs.
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "command.h"
 #include "common.h"
@@ -105,8 +106,17 @@ std::vector<FinishedRun> read_runs(const std::vector<std::string>& paths, const 
   return runs;
 }
 
+/// A run that is given twice would count twice.
+void refuse_repeats(const std::vector<std::string>& runs) {
+  std::set<std::filesystem::path> seen;
+  for (const std::string& run : runs)
+    if (!seen.insert(std::filesystem::weakly_canonical(run)).second)
+      throw InvalidInput("merge: " + run + ": given twice, expected each run once");
+}
+
 int run_merge(const Invocation& invocation, const MergeCommandOptions& options) {
   if (invocation.inputs.size() < 2) throw InvalidInput("merge: found 1 run, expected at least 2");
+  refuse_repeats(invocation.inputs);
   Session session(options.common);
   const std::vector<FinishedRun> runs = read_runs(invocation.inputs, session.context());
   check_compatible(runs);
@@ -143,7 +153,8 @@ void add_merge(Commands& commands) {
   CommandForm form{"merge", "Join the volumes of several runs", "RUN...", "RUN"};
   form.details =
       "Runs of neighbouring boxes, or of the same box from other photographs, with voxels of one size on\n"
-      "one lattice: what one run over all photographs would have summed.\n";
+      "one lattice. Their last passes' sums are added up as if they were one pass's; each run has compared\n"
+      "its photographs with its own colours, so one run over all of them may come to other opacities.\n";
   add_command(commands, form, merge_table(), run_merge);
 }
 

@@ -454,6 +454,7 @@ class OtherCommands(Case):
     def test_merge_refuses_what_does_not_fit(self):
         rgb, _ = self.reconstruct("rgb", "--color-space", "rgb")
         self.expect_error(2, "colour space rgb, expected luv", "merge", self.run_folder, rgb, "-o", self.folder / "never")
+        self.expect_error(2, "given twice", "merge", self.run_folder, f"{self.run_folder}/.", "-o", self.folder / "never")
         self.assertFalse((self.folder / "never").exists())
 
     def test_convert_gives_the_same_cameras_in_both_formats(self):
@@ -670,7 +671,7 @@ class Interrupt(Case):
         (run_folder / "summary.json").unlink()
         os.mkfifo(run_folder / "summary.json")
         out = self.folder / "never"
-        for command in (["eval", run_folder], ["render", run_folder], ["merge", run_folder, run_folder]):
+        for command in (["eval", run_folder], ["render", run_folder], ["merge", run_folder, self.folder]):
             with self.subTest(command[0]):
                 job = subprocess.Popen([ROXEL, *map(str, command), "-o", str(out)], stderr=subprocess.PIPE, text=True)
                 with open(run_folder / "summary.json", "w") as pipe:  # opens when roxel does
