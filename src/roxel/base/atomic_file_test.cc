@@ -1,16 +1,15 @@
 #include "roxel/base/atomic_file.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <thread>
 #include <vector>
 
 #include "roxel/base/error.h"
+#include "roxel/base/full_disc_fixture.h"
 
 namespace roxel {
 namespace {
@@ -90,30 +89,10 @@ TEST_F(AtomicFile, ReportsATargetThatCannotBe) {
   EXPECT_THROW(write_text_atomically("/proc/roxel/x", "x"), IoError);
 }
 
-/// Stands in for a full disc: while it lives, files of this process cannot grow past `bytes`.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
-
 TEST_F(AtomicFile, LeavesTheOldFileWhenTheDiscIsFull) {
   write_text_atomically(folder_ / "a.txt", "old");
   {
-    const FileSizeLimit limit(1000);
+    const fixture::FileSizeLimit limit(1000);
     EXPECT_THROW(write_text_atomically(folder_ / "a.txt", std::string(100000, 'x')), IoError);
   }
   EXPECT_EQ(content(folder_ / "a.txt"), "old");

@@ -3,15 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <random>
 
 #include "roxel/base/error.h"
+#include "roxel/base/full_disc_fixture.h"
 
 namespace roxel {
 namespace {
@@ -145,30 +144,12 @@ TEST_F(VolumeFileTest, OtherProgramsSeeOpacityAndLinearColourAtVoxelCentres) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(color->tree().getValue({1, 2, 3})[c], rgb[c], 1e-5);
 }
 
-/// While it lives, files of this process end at `bytes`, as on a full disc.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &old_);
-    const rlimit limit{bytes, old_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &old_);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-
- private:
-  void (*old_handler_)(int);
-  rlimit old_{};
-};
-
 TEST_F(VolumeFileTest, AFullDiscIsAnErrorAndKeepsWhatWasThere) {
   const Volume volume = random_volume();
   write_volume(path_, volume, some_info());
   const auto whole = fs::file_size(path_);
   for (const double share : {0.05, 0.5, 0.95, 0.999}) {
-    const FileSizeLimit limit(static_cast<rlim_t>(share * static_cast<double>(whole)));
+    const fixture::FileSizeLimit limit(static_cast<rlim_t>(share * static_cast<double>(whole)));
     EXPECT_THROW(write_volume(path_, volume, some_info()), IoError) << share;
   }
   EXPECT_EQ(fs::file_size(path_), whole);

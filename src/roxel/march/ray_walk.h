@@ -77,8 +77,8 @@ inline int cell_index(CellCode code, int axis) {
 /// voxel_in_brick of the cell: one multiplication brings the fields' low bits side by side.
 inline int cell_in_brick(CellCode code) {
   using namespace internal;
-  constexpr int kTop =
-      46;  // x's bits end up here, y's and z's above; the other products stay below or fall out
+  // x's bits end up here, y's and z's above; the other products stay below or fall out.
+  constexpr int kTop = 46;
   constexpr CellCode kGather =
       CellCode{1} << kTop | CellCode{1} << (kTop + 3 - kCellBits) | CellCode{1} << (kTop + 6 - 2 * kCellBits);
   return static_cast<int>((code & kCellInBrick) * kGather >> kTop);

@@ -93,12 +93,11 @@ Image matching_image(const Photograph& photo, const Scene& scene) {
 /// Every level's lattice is that of the coarsest, divided: with many levels its bricks reach far out of the
 /// box.
 void check_levels(const Scene& scene, const ReconstructOptions& options) {
-  constexpr double kMostBricks = 1 << 28;
   const double coarsest = std::ldexp(scene.voxel_size, options.levels - 1);
   const Eigen::Vector3d bricks =
       nested_frames(scene.bounds.box, coarsest, 0)[0].size_in_bricks.cast<double>() *
       std::ldexp(1.0, options.levels - 1);
-  if (bricks.prod() > kMostBricks)
+  if (bricks.prod() > kMaxBricks)
     throw_invalid(
         "--levels",
         std::to_string(options.levels) + " levels down to voxels of " + std::to_string(scene.voxel_size),

@@ -9,9 +9,6 @@
 namespace roxel {
 namespace {
 
-// The brick table of a lattice is dense, 4 bytes a brick: 1 GiB is where a voxel size is taken for a mistake.
-constexpr double kMaxBricks = 1 << 28;
-
 // exp(-16) is 1e-7, the last opacity below 1 that a float can tell from 1.
 constexpr float kMaxTau = 16.0f;
 

@@ -29,6 +29,9 @@ namespace roxel {
 
 inline constexpr int kBrickSide = 8;
 inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;
+/// The brick table of a lattice is dense, 4 bytes a brick: 1 GiB is where a voxel size is taken for a
+/// mistake.
+inline constexpr double kMaxBricks = 1 << 28;
 inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
 inline constexpr std::uint16_t kNoVoxel = 0xffffu;
 
