@@ -245,6 +245,31 @@ TEST(RayWalk, AnnouncesEachBrickBeforeItsFirstVoxel) {
   }
 }
 
+// Also along rays that pass many bricks without meeting a voxel of them.
+TEST(RayWalk, ListsOnlyBricksThatHaveStepsInTheChunk) {
+  std::mt19937 random(17);
+  const Volume sparse = one_lattice(0.002, {300, 2, 2}, random), dense = one_lattice(0.5, {40, 3, 3}, random);
+  for (const Volume* volume : {&sparse, &dense}) {
+    const LatticeStack stack(*volume);
+    RandomRays rays(volume->index(0).frame().box(), 18);
+    StepChunk chunk;
+    const auto listed = [](const StepChunk& steps) {
+      for (int b = 0; b < steps.brick_count; ++b)
+        if (steps.brick_begin[b] >= (b + 1 < steps.brick_count ? steps.brick_begin[b + 1] : steps.count))
+          return false;
+      return steps.brick_count <= steps.count;
+    };
+    const auto ignore = [](std::uint32_t) {};
+    const Ray along{{-2, 3, 1.5}, {1, 0.0005, 0.0003}};
+    for (int i = 0; i < 500; ++i)
+      stack.walk_chunks(i == 0 ? along : rays.any(), {0, 1000}, nullptr, chunk, ignore,
+                        [&](const StepChunk& steps) {
+                          EXPECT_TRUE(listed(steps));
+                          return true;
+                        });
+  }
+}
+
 TEST(RayWalk, StopsWhenTheVisitorSaysSo) {
   std::mt19937 random(15);
   const Volume volume = nested(1, 1, random);

@@ -141,11 +141,12 @@ TEST(Reconstruct, HalvesVoxelsFromLevelToLevel) {
 }
 
 /// One level of up to 50 passes that ends where a pass changes opacities by less than 0.02.
-Reconstruction run_to_rest(int draft_passes) {
+Reconstruction run_to_rest(int draft_passes, double spatial_prior = 0.95) {
   ReconstructOptions options = cube_options();
   options.levels = 1;
   options.passes = 50;
   options.draft_passes = draft_passes;
+  options.spatial_prior = spatial_prior;
   options.tolerance = 0.02;
   RunContext context(2);
   return reconstruct(cube_dataset(6, 32), cube_loader(), options, context);
@@ -239,6 +240,17 @@ TEST(Reconstruct, StopsALevelThatHasComeToRest) {
   ASSERT_GE(count, 3u);
   EXPECT_LT(result.summary.passes[count - 2].mean_opacity_change, 0.02);
   for (std::size_t i = 0; i + 2 < count; ++i) EXPECT_GE(result.summary.passes[i].mean_opacity_change, 0.02);
+}
+
+TEST(Reconstruct, OpacitiesAtRestFollowFromTheLastPassAlone) {
+  const Volume volume = run_to_rest(0, 0).volume;  // the same prior everywhere
+  const ReconstructOptions options = cube_options();
+  const double beta = options.prior_strength, tau_0 = -std::log1p(-options.prior_opacity);
+  for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot) {
+    const auto [hits, exposure] = volume.support[slot];
+    const double em = (hits + beta * tau_0) / (exposure + beta);
+    ASSERT_NEAR(volume.tau[slot], std::min(em, 16.0), 1e-4 * (1 + em)) << slot;
+  }
 }
 
 TEST(Reconstruct, DraftsThatHaveComeToRestAreFollowedByPassesOnAllSamples) {
