@@ -1,9 +1,10 @@
 /// What one full pass costs on a finished run's volume and its photographs:
 ///
-///     pass_on_run DATASET RUN [IMAGES [THREADS]]
+///     pass_on_run DATASET RUN [IMAGES [THREADS [PASSES]]]
 ///
 /// RUN is the folder of a `roxel reconstruct DATASET` with bounds or masks (its volume.vdb holds the box, no
-/// surround). IMAGES, a pattern, keeps some of the photographs. Prints rays, steps and nanoseconds a step.
+/// surround). IMAGES, a pattern, keeps some of the photographs. Prints rays, steps and nanoseconds a step of
+/// PASSES passes.
 
 #include <cstdio>
 #include <cstdlib>
@@ -28,7 +29,7 @@ ReconstructOptions options_for(const Volume& volume) {
   return options;
 }
 
-void measure(const char* dataset_path, const char* run, const char* images, int threads) {
+void measure(const char* dataset_path, const char* run, const char* images, int threads, int passes) {
   ReadOptions read;
   read.images = images;
   const Dataset dataset = read_dataset(dataset_path, read);
@@ -42,8 +43,7 @@ void measure(const char* dataset_path, const char* run, const char* images, int 
   std::printf("%zu images, %u voxels, %d threads\n%6s %12s %12s %9s | %12s %12s %9s %9s | %s\n",
               dataset.views.size(), volume.slot_count(), threads, "pass", "color rays", "steps", "wall s",
               "rays", "steps", "wall s", "ns/step", "mean log-likelihood");
-  constexpr int kPasses = 6;
-  for (int pass = 1; pass <= kPasses; ++pass) {
+  for (int pass = 1; pass <= passes; ++pass) {
     const PassReport report = run_pass(samples, pass_options(scene, options), context, nullptr, volume);
     std::printf("%6d %12lld %12lld %9.2f | %12lld %12lld %9.2f %9.1f | %.6f\n", pass,
                 static_cast<long long>(report.color.rays), static_cast<long long>(report.color.steps),
@@ -57,12 +57,13 @@ void measure(const char* dataset_path, const char* run, const char* images, int 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 3 || argc > 5) {
-    std::fprintf(stderr, "usage: %s DATASET RUN [IMAGES [THREADS]]\n", argv[0]);
+  if (argc < 3 || argc > 6) {
+    std::fprintf(stderr, "usage: %s DATASET RUN [IMAGES [THREADS [PASSES]]]\n", argv[0]);
     return 2;
   }
   try {
-    measure(argv[1], argv[2], argc > 3 ? argv[3] : "", argc > 4 ? std::atoi(argv[4]) : 1);
+    measure(argv[1], argv[2], argc > 3 ? argv[3] : "", argc > 4 ? std::atoi(argv[4]) : 1,
+            argc > 5 ? std::atoi(argv[5]) : 6);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: %s\n", argv[0], error.what());
     return 2;

@@ -49,6 +49,13 @@ class SamplePyramid {
     return level > 0 ? stored.regions[index] : pixel(index);
   }
 
+  /// The same region's `valid` alone.
+  float valid(int level, int x, int y) const {
+    const Level& stored = levels_[level - finest_level_];
+    const std::size_t index = static_cast<std::size_t>(y) * stored.width + x;
+    return level > 0 ? stored.regions[index].valid : valid_share(index);
+  }
+
   /// The mean interpolated between the four regions around pixel position (u, v), (0.5, 0.5) being the
   /// top-left pixel's centre. Regions count by their valid share, and by their foreground too where the
   /// region that (u, v) is in has any; beyond the border the outermost regions go on. False, and mean = 0,
@@ -66,12 +73,13 @@ class SamplePyramid {
   };
   struct Builder;
 
+  static constexpr float kByte = 1.0f / 255.0f;
+  float valid_share(std::size_t index) const { return valid_.empty() ? 1.0f : valid_[index] * kByte; }
   RegionStats pixel(std::size_t index) const {
     const float* mean = pixels_.data() + 3 * index;
-    constexpr float kByte = 1.0f / 255.0f;
     return {{mean[0], mean[1], mean[2]},
             {0, 0, 0, 0, 0, 0},
-            valid_.empty() ? 1.0f : valid_[index] * kByte,
+            valid_share(index),
             foreground_.empty() ? 1.0f : foreground_[index] * kByte};
   }
 

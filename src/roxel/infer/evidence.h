@@ -25,10 +25,11 @@ struct alignas(64) VoxelScratch {
   float cov[6];
   float evidence;
   float tau;
+  float unused;
   float hits;      ///< sum of r
   float exposure;  ///< posterior: sum of (R - r) l + r e; roxels: sum of r alpha
   float looked;    ///< largest reach x ray weight
-  float padding[2];
+  float unused_too;
 };
 
 /// Totals of one voxel's colour: 0 weight, 1-3 sum w x, 4-9 sum w x x' (order xx, yy, zz, xy, xz, yz).
@@ -74,6 +75,7 @@ class NodeScratch {
   VoxelScratch& operator[](std::uint32_t slot) { return voxels_[slot]; }
   const VoxelScratch& operator[](std::uint32_t slot) const { return voxels_[slot]; }
   const VoxelScratch* voxels() const { return voxels_.get(); }
+  VoxelScratch* voxels() { return voxels_.get(); }
   /// Sets up the brick's voxels if this node has not been here before: their tau, no sums, and the colours of
   /// compare_with, if any.
   void enter(std::uint32_t brick) {

@@ -16,7 +16,7 @@ inline __attribute__((always_inline)) float mean_path_core(float x, float a) {
   // there.
   const float safe_x = x > 0.25f ? x : 0.25f;
   const float safe_a = a > 0.22119922f ? a : 0.22119922f;
-  const float exact = 1.0f / safe_x - (1.0f - safe_a) / safe_a;
+  const float exact = (safe_a - safe_x * (1.0f - safe_a)) / (safe_x * safe_a);
   return x < 0.5f ? series : exact;
 }
 
@@ -34,7 +34,8 @@ struct GaussianAgreement {
     const float least = normaliser * normaliser;
     const float determinant = minors > least ? minors : least;
     const float quadratic = adjugate > 0.0f ? adjugate : 0.0f;
-    return normaliser / std::sqrt(determinant) * exp_negative(-0.5f * quadratic / determinant);
+    const float inverse = 1.0f / determinant;
+    return normaliser * std::sqrt(inverse) * exp_negative(-0.5f * quadratic * inverse);
   }
 };
 
@@ -57,39 +58,40 @@ struct LinearAgreement {
 
 template <class Function>
 inline __attribute__((always_inline)) void evaluate_with(const Function& agreement_of,
-                                                         const MatchModel& model, const SampleTerms& sample,
+                                                         const MatchModel& model, const LaneTerms& samples,
                                                          int count, MatchBlock& block) {
-  const float s0 = sample.cov_plus_noise[0], s1 = sample.cov_plus_noise[1], s2 = sample.cov_plus_noise[2];
-  const float s3 = sample.cov_plus_noise[3], s4 = sample.cov_plus_noise[4], s5 = sample.cov_plus_noise[5];
-  const float foreground = sample.foreground, outlier = model.outlier;
-  const float half = model.evidence_half, uninformative = model.uninformative;
-  // Whole eighths: what lies behind the count is computed and left unread.
-  const int padded = (count + 7) / 8 * 8;
-  for (int i = 0; i < padded; ++i) {
-    const float x = block.tau[i] * block.length[i];
-    const float a = one_minus_exp(x);
-    block.opacity[i] = a;
-    block.mean_path[i] = block.length[i] * mean_path_core(x, a);
-    const float matched = agreement_of(block.diff[0][i], block.diff[1][i], block.diff[2][i],
-                                       block.cov[0][i] + s0, block.cov[1][i] + s1, block.cov[2][i] + s2,
-                                       block.cov[3][i] + s3, block.cov[4][i] + s4, block.cov[5][i] + s5);
-    const float w = block.evidence[i];
-    const float mixed = (w * matched + half * uninformative) / (w + half + 1e-30f);
-    block.likelihood[i] = foreground * mixed + outlier;
-  }
+  const LaneTerms terms = samples;  // what nothing else can change stays in registers
+  const float outlier = model.outlier, half = model.evidence_half, uninformative = model.uninformative;
+  // Whole rows of lanes: what lies behind the count is computed and left unread.
+  for (int first = 0; first < count; first += kLanes)
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const int i = first + lane;
+      const float x = block.tau[i] * block.length[i];
+      const float a = one_minus_exp(x);
+      block.opacity[i] = a;
+      block.mean_path[i] = block.length[i] * mean_path_core(x, a);
+      const auto cov = [&](int c) __attribute__((always_inline)) {
+        return block.cov[c][i] + terms.cov_plus_noise[c][lane];
+      };
+      const float matched = agreement_of(block.diff[0][i], block.diff[1][i], block.diff[2][i], cov(0), cov(1),
+                                         cov(2), cov(3), cov(4), cov(5));
+      const float w = block.evidence[i];
+      const float mixed = (w * matched + half * uninformative) / (w + half + 1e-30f);
+      block.likelihood[i] = terms.foreground[lane] * mixed + outlier;
+    }
 }
 
 ROXEL_KERNEL void evaluate_gaussian(const GaussianAgreement& agreement_of, const MatchModel& model,
-                                    const SampleTerms& sample, int count, MatchBlock& block) {
-  evaluate_with(agreement_of, model, sample, count, block);
+                                    const LaneTerms& samples, int count, MatchBlock& block) {
+  evaluate_with(agreement_of, model, samples, count, block);
 }
 ROXEL_KERNEL void evaluate_exponential(const ExponentialAgreement& agreement_of, const MatchModel& model,
-                                       const SampleTerms& sample, int count, MatchBlock& block) {
-  evaluate_with(agreement_of, model, sample, count, block);
+                                       const LaneTerms& samples, int count, MatchBlock& block) {
+  evaluate_with(agreement_of, model, samples, count, block);
 }
 ROXEL_KERNEL void evaluate_linear(const LinearAgreement& agreement_of, const MatchModel& model,
-                                  const SampleTerms& sample, int count, MatchBlock& block) {
-  evaluate_with(agreement_of, model, sample, count, block);
+                                  const LaneTerms& samples, int count, MatchBlock& block) {
+  evaluate_with(agreement_of, model, samples, count, block);
 }
 
 GaussianAgreement gaussian_of(const MatchModel& model) {
@@ -97,6 +99,16 @@ GaussianAgreement gaussian_of(const MatchModel& model) {
 }
 
 }  // namespace
+
+LaneTerms::LaneTerms(const SampleTerms& sample) {
+  for (int lane = 0; lane < kLanes; ++lane) set(lane, sample);
+}
+
+void LaneTerms::set(int lane, const SampleTerms& sample) {
+  for (int c = 0; c < 3; ++c) mean[c][lane] = sample.mean[c];
+  for (int c = 0; c < 6; ++c) cov_plus_noise[c][lane] = sample.cov_plus_noise[c];
+  foreground[lane] = sample.foreground;
+}
 
 SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model) {
   SampleTerms terms;
@@ -107,14 +119,14 @@ SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model) {
   return terms;
 }
 
-void evaluate_match(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block) {
+void evaluate_match(const MatchModel& model, const LaneTerms& samples, int count, MatchBlock& block) {
   switch (model.agreement) {
     case Agreement::kGaussian:
-      return evaluate_gaussian(gaussian_of(model), model, sample, count, block);
+      return evaluate_gaussian(gaussian_of(model), model, samples, count, block);
     case Agreement::kExponential:
-      return evaluate_exponential({1 / (model.scale * model.scale)}, model, sample, count, block);
+      return evaluate_exponential({1 / (model.scale * model.scale)}, model, samples, count, block);
     case Agreement::kLinear:
-      return evaluate_linear({1 / model.scale}, model, sample, count, block);
+      return evaluate_linear({1 / model.scale}, model, samples, count, block);
   }
 }
 

@@ -4,6 +4,7 @@
 /// (4.5).
 
 #include "roxel/base/fast_exp.h"
+#include "roxel/base/lanes.h"
 #include "roxel/image/sample_pyramid.h"
 
 namespace roxel {
@@ -33,7 +34,20 @@ struct SampleTerms {
 
 SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model);
 
-/// Structure of arrays for up to kSize voxels along a ray: the inputs are gathered, the outputs computed.
+/// The terms of the samples that the entries of a block belong to: entry i to lane i % kLanes.
+struct alignas(32) LaneTerms {
+  float mean[3][kLanes] = {};
+  float cov_plus_noise[6][kLanes] = {};
+  float foreground[kLanes] = {};
+
+  LaneTerms() = default;
+  /// One sample in all lanes.
+  explicit LaneTerms(const SampleTerms& sample);
+  void set(int lane, const SampleTerms& sample);
+};
+
+/// Structure of arrays for up to kSize voxels along a ray, or kSize / kLanes along each of kLanes rays: the
+/// inputs are gathered, the outputs computed.
 struct alignas(64) MatchBlock {
   static constexpr int kSize = 64;
   float diff[3][kSize];     ///< in: voxel mean minus sample mean
@@ -47,7 +61,10 @@ struct alignas(64) MatchBlock {
 };
 
 /// Fills the outputs of the first `count` entries.
-void evaluate_match(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block);
+void evaluate_match(const MatchModel& model, const LaneTerms& samples, int count, MatchBlock& block);
+inline void evaluate_match(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block) {
+  evaluate_match(model, LaneTerms(sample), count, block);
+}
 
 /// Agreement of two Gaussians in (0, 1] (or the baseline's value), one pair at a time; the slow twin of the
 /// block.

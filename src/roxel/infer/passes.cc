@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "roxel/march/brick_sight.h"
+#include "roxel/infer/opacity_packets.h"
 
 namespace roxel {
 
@@ -15,31 +15,6 @@ PassCounts& PassCounts::operator+=(const PassCounts& other) {
 }
 
 namespace {
-
-/// A view under way, with where its rays can meet anything.
-struct ViewInSight {
-  const SampleView& view;
-  BrickSight sight;
-};
-
-/// Calls visit(view in sight, region) for every root sample of the node, in a fixed order: tile by tile, so
-/// that the voxels of neighbouring rays are still in the cache.
-template <class Visit>
-void for_each_root(const LatticeStack& stack, const SampleNode& node, const RunContext& context,
-                   Visit&& visit) {
-  constexpr int kTile = 32;
-  for (const SampleView& view : node) {
-    const ViewInSight in_sight{view, BrickSight(stack, view.camera)};
-    const int level = view.plan.root_level;
-    const int width = view.pyramid->width(level), height = view.pyramid->height(level);
-    for (int y0 = 0; y0 < height; y0 += kTile)
-      for (int x0 = 0; x0 < width; x0 += kTile) {
-        context.throw_if_cancelled();
-        for (int y = y0; y < std::min(y0 + kTile, height); ++y)
-          for (int x = x0; x < std::min(x0 + kTile, width); ++x) visit(in_sight, Region{level, x, y});
-      }
-  }
-}
 
 class ColorMarch {
  public:
@@ -299,6 +274,12 @@ PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const 
 
 PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
                          const RunContext& context, NodeScratch& scratch) {
+  if (OpacityPackets::serves(options)) {
+    OpacityPackets packets(stack, options, scratch);
+    for_each_tile(stack, node, context,
+                  [&](const ViewInSight& in_sight, const Tile& tile) { packets.tile(in_sight, tile); });
+    return packets.counts;
+  }
   OpacityMarch march(stack, options, scratch);
   for_each_root(stack, node, context,
                 [&](const ViewInSight& in_sight, const Region& region) { march.root(in_sight, region); });

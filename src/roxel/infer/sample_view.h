@@ -49,8 +49,12 @@ inline bool inside(const SampleView& view, const Region& region) {
   return region.x < view.pyramid->width(region.level) && region.y < view.pyramid->height(region.level);
 }
 
+inline float observation_weight(const SampleView& view, const Region& region, float valid) {
+  return valid * view.pixel_weight * static_cast<float>(std::int64_t{1} << (2 * region.level));
+}
+
 inline float observation_weight(const SampleView& view, const Region& region, const RegionStats& sample) {
-  return sample.valid * view.pixel_weight * static_cast<float>(std::int64_t{1} << (2 * region.level));
+  return observation_weight(view, region, sample.valid);
 }
 
 /// The stretch of depths that the region's sample serves, from where its parent stopped.

@@ -1,68 +1,8 @@
 #include "roxel/infer/segment_march.h"
 
-#include <cmath>
-#include <cstring>
-
-#include "roxel/base/kernel.h"
+#include "roxel/infer/gather.h"
 
 namespace roxel {
-
-namespace {
-
-/// Eight floats in a register where the machine has such, two halves where not.
-using Eight = float __attribute__((vector_size(32)));
-constexpr int kLanes = 8;
-
-inline __attribute__((always_inline)) void load(const float* from, Eight& to) {
-  std::memcpy(&to, from, sizeof(Eight));
-}
-
-/// rows[i][j] <-> rows[j][i].
-inline __attribute__((always_inline)) void transpose(Eight rows[kLanes]) {
-  Eight a[kLanes], b[kLanes];
-  for (int i = 0; i < kLanes; i += 2) {
-    a[i] = __builtin_shufflevector(rows[i], rows[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-    a[i + 1] = __builtin_shufflevector(rows[i], rows[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-  }
-  for (int i = 0; i < kLanes; i += 4)
-    for (int j = 0; j < 2; ++j) {
-      b[i + 2 * j] = __builtin_shufflevector(a[i + j], a[i + 2 + j], 0, 1, 8, 9, 4, 5, 12, 13);
-      b[i + 2 * j + 1] = __builtin_shufflevector(a[i + j], a[i + 2 + j], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-  for (int i = 0; i < kLanes / 2; ++i) {
-    rows[i] = __builtin_shufflevector(b[i], b[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-    rows[i + 4] = __builtin_shufflevector(b[i], b[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-  }
-}
-
-/// Fills what the block takes from voxels for the first `count` entries: each voxel's cache line is read once
-/// and turned in registers. `slots` must be good up to the next eighth.
-ROXEL_KERNEL void gather_voxels(const VoxelScratch* voxels, const std::uint32_t* slots, int count,
-                                const float sample_mean[3], MatchBlock& block) {
-  static_assert(offsetof(VoxelScratch, cov) == 3 * sizeof(float) &&
-                offsetof(VoxelScratch, evidence) == 9 * sizeof(float) &&
-                offsetof(VoxelScratch, tau) == 10 * sizeof(float));
-  for (int first = 0; first < count; first += kLanes) {
-    Eight low[kLanes], high[kLanes];
-    for (int i = 0; i < kLanes; ++i) {
-      const float* voxel = voxels[slots[first + i]].mean;
-      load(voxel, low[i]);
-      load(voxel + kLanes, high[i]);
-    }
-    transpose(low);
-    transpose(high);
-    const auto store = [first](float* to, const Eight& from) __attribute__((always_inline)) {
-      std::memcpy(to + first, &from, sizeof(Eight));
-    };
-    for (int c = 0; c < 3; ++c) store(block.diff[c], low[c] - sample_mean[c]);
-    for (int c = 0; c < 5; ++c) store(block.cov[c], low[3 + c]);
-    store(block.cov[5], high[0]);
-    store(block.evidence, high[1]);
-    store(block.tau, high[2]);
-  }
-}
-
-}  // namespace
 
 void RemovedColor::remove(float a, const float color_mean[3], const float color_cov[6], float limit) {
   if (a >= limit) return;
@@ -115,7 +55,7 @@ Segment SegmentMarch::march(const SampleView& view, const Region& region, const 
 
 void SegmentMarch::gather(const SampleView& view, const Region& region, const SampleTerms& terms,
                           const StepChunk& chunk) {
-  gather_voxels(scratch_.voxels(), chunk.slot, chunk.count, terms.mean, block_);
+  gather_voxels(scratch_.voxels(), chunk.slot, chunk.count, LaneTerms(terms), block_);
   std::copy(chunk.length, chunk.length + StepChunk::kSize, block_.length);
   if (!filters_.interpolate) return;
   const LatticeFrame& frame = stack_.volume().index(chunk.lattice).frame();

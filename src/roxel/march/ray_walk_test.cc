@@ -2,52 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
-
-#include "roxel/march/ray_twin.h"
+#include "roxel/march/walk_fixture.h"
 
 namespace roxel {
 namespace {
-
-constexpr double kSliver = 1e-6;           // voxel lengths; shorter chords may fall to either side of an edge
-constexpr double kLengthTolerance = 2e-6;  // chords are floats of order 1
-constexpr double kWeightTolerance = 2e-4;
-
-std::vector<LatticeFrame> frames_of(const Volume& volume) {
-  std::vector<LatticeFrame> frames;
-  for (int k = 0; k < volume.lattice_count(); ++k) frames.push_back(volume.index(k).frame());
-  return frames;
-}
-
-/// About `share` of all voxels, with one brick in four left out whole; all of them where share is 1.
-Topology random_topology(const LatticeFrame& frame, double share, std::mt19937& random) {
-  Topology topology(frame);
-  std::bernoulli_distribution exists(share), brick_exists(share < 1 ? 0.75 : 1);
-  const Eigen::Vector3i n = frame.size_in_bricks;
-  for (int z = 0; z < n.z(); ++z)
-    for (int y = 0; y < n.y(); ++y)
-      for (int x = 0; x < n.x(); ++x) {
-        BrickMask mask;
-        for (int v = 0; v < kBrickVoxels; ++v) mask[v] = exists(random);
-        if (brick_exists(random)) topology.insert_brick({x, y, z}, mask);
-      }
-  return topology;
-}
-
-Volume one_lattice(double share, const Eigen::Vector3i& bricks, std::mt19937& random) {
-  const LatticeFrame frame{{-1, 2, 0.5}, 0.25, bricks};
-  return Volume({random_topology(frame, share, random)});
-}
-
-Volume nested(double share, int surround, std::mt19937& random) {
-  const Eigen::AlignedBox3d box(Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1));
-  std::vector<Topology> lattices;
-  for (const LatticeFrame& frame : nested_frames(box, 0.25, surround)) {
-    lattices.push_back(random_topology(frame, share, random));
-    if (lattices.size() > 1) lattices.back().erase_inside(lattices[lattices.size() - 2].frame().box());
-  }
-  return Volume(std::move(lattices));
-}
 
 std::vector<VoxelStep> walked(const LatticeStack& stack, const Ray& ray, Stretch range) {
   std::vector<VoxelStep> steps;
@@ -60,64 +18,13 @@ std::vector<VoxelStep> walked(const LatticeStack& stack, const Ray& ray, Stretch
   return steps;
 }
 
-std::vector<TwinChord> existing(const Volume& volume, const Ray& ray, Stretch range) {
-  std::vector<TwinChord> chords = twin_joined(twin_chords(frames_of(volume), ray, range), kSliver);
-  std::erase_if(chords, [&](const TwinChord& c) { return volume.index(c.lattice).slot(c.ijk) == kNoSlot; });
-  return chords;
-}
-
-/// Whether the walk and the twin meet the same voxels in the same order with the same chords.
+/// Whether the walk and the twin meet the same voxels in the same order with the same chords, depths too.
 ::testing::AssertionResult same_walk(const LatticeStack& stack, const Ray& ray, Stretch range) {
-  const Volume& volume = stack.volume();
   const std::vector<VoxelStep> steps = walked(stack, ray, range);
-  const std::vector<TwinChord> chords = existing(volume, ray, range);
-  const auto failure = [&] {
-    return ::testing::AssertionFailure()
-           << "ray from " << ray.origin.transpose() << " along " << ray.direction.transpose() << " in ["
-           << range.begin << ", " << range.end << "]: ";
-  };
-  if (steps.size() != chords.size())
-    return failure() << steps.size() << " steps, " << chords.size() << " chords";
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    const TwinChord& chord = chords[i];
-    const bool same = steps[i].slot == volume.index(chord.lattice).slot(chord.ijk) &&
-                      std::abs(steps[i].length - chord.length) <= kLengthTolerance &&
-                      std::abs(steps[i].depth - chord.depth()) <= 1e-6 * (1 + chord.depth()) &&
-                      std::abs(steps[i].weight - chord.weight) <= kWeightTolerance;
-    if (!same)
-      return failure() << "step " << i << ": slot " << steps[i].slot << ", length " << steps[i].length
-                       << ", weight " << steps[i].weight << ", depth " << steps[i].depth << "; expected slot "
-                       << volume.index(chord.lattice).slot(chord.ijk) << ", length " << chord.length
-                       << ", weight " << chord.weight << ", depth " << chord.depth();
-  }
-  return ::testing::AssertionSuccess();
+  for (const VoxelStep& step : steps)
+    if (!std::isfinite(step.depth)) return ::testing::AssertionFailure() << "a step without depth";
+  return same_as_twin(stack.volume(), ray, range, steps);
 }
-
-class RandomRays {
- public:
-  explicit RandomRays(const Eigen::AlignedBox3d& box, unsigned seed) : box_(box), random_(seed) {}
-
-  /// From anywhere in a box three times as large to anywhere in the box.
-  Ray any() {
-    const Eigen::Vector3d from = box_.center() + 3 * (point() - box_.center());
-    return {from, (point() - from) * scale_(random_)};
-  }
-  Eigen::Vector3d point() {
-    Eigen::Vector3d x;
-    for (int a = 0; a < 3; ++a) x[a] = box_.min()[a] + unit_(random_) * box_.sizes()[a];
-    return x;
-  }
-  Stretch range() {
-    const double begin = unit_(random_);
-    return {begin, begin + 4 * unit_(random_)};
-  }
-  std::mt19937& engine() { return random_; }
-
- private:
-  Eigen::AlignedBox3d box_;
-  std::mt19937 random_;
-  std::uniform_real_distribution<double> unit_{0, 1}, scale_{0.3, 2};
-};
 
 TEST(RayWalk, MeetsWhatSortedPlaneCrossingsMeet) {
   std::mt19937 random(1);

@@ -1,0 +1,92 @@
+#pragma once
+/// Eight numbers side by side, as the compiler's vectors: one register with AVX2, two without. Arithmetic,
+/// comparisons (all bits set where true) and `mask ? a : b` work lane by lane. For use inside ROXEL_KERNEL
+/// functions, whose inlined parts are compiled for the same machine; passed by reference, never by value.
+
+#include <cstdint>
+
+namespace roxel {
+
+inline constexpr int kLanes = 8;
+using Floats = float __attribute__((vector_size(4 * kLanes)));
+using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
+using FourFloats = float __attribute__((vector_size(16)));
+
+/// Reads and writes without any demand on alignment, and whatever type of four bytes lies there.
+template <class Vector, class Element>
+inline __attribute__((always_inline)) void load(const Element* from, Vector& to) {
+  using Anywhere __attribute__((aligned(4), may_alias)) = Vector;
+  to = *reinterpret_cast<const Anywhere*>(from);
+}
+template <class Vector, class Element>
+inline __attribute__((always_inline)) void store(const Vector& from, Element* to) {
+  using Anywhere __attribute__((aligned(4), may_alias)) = Vector;
+  *reinterpret_cast<Anywhere*>(to) = from;
+}
+
+/// Whether any lane of a mask is set.
+inline __attribute__((always_inline)) bool any(const Ints& mask) {
+  std::int64_t pairs[kLanes / 2];
+  store(mask, pairs);
+  return (pairs[0] | pairs[1] | pairs[2] | pairs[3]) != 0;
+}
+
+/// rows[i][j] <-> rows[j][i].
+inline __attribute__((always_inline)) void transpose(Floats rows[kLanes]) {
+  Floats a[kLanes], b[kLanes];
+#pragma GCC unroll 4
+  for (int i = 0; i < kLanes; i += 2) {
+    a[i] = __builtin_shufflevector(rows[i], rows[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+    a[i + 1] = __builtin_shufflevector(rows[i], rows[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+  }
+#pragma GCC unroll 2
+  for (int i = 0; i < kLanes; i += 4)
+#pragma GCC unroll 2
+    for (int j = 0; j < 2; ++j) {
+      b[i + 2 * j] = __builtin_shufflevector(a[i + j], a[i + 2 + j], 0, 1, 8, 9, 4, 5, 12, 13);
+      b[i + 2 * j + 1] = __builtin_shufflevector(a[i + j], a[i + 2 + j], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+#pragma GCC unroll 4
+  for (int i = 0; i < kLanes / 2; ++i) {
+    rows[i] = __builtin_shufflevector(b[i], b[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    rows[i + 4] = __builtin_shufflevector(b[i], b[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
+}
+
+/// columns[c][lane] = rows[lane][c].
+inline __attribute__((always_inline)) void transpose(const FourFloats rows[kLanes], Floats columns[4]) {
+  Floats pairs[4];  // rows i and i + 4
+#pragma GCC unroll 4
+  for (int i = 0; i < 4; ++i)
+    pairs[i] = __builtin_shufflevector(rows[i], rows[i + 4], 0, 1, 2, 3, 4, 5, 6, 7);
+  const Floats a = __builtin_shufflevector(pairs[0], pairs[1], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Floats b = __builtin_shufflevector(pairs[0], pairs[1], 2, 10, 3, 11, 6, 14, 7, 15);
+  const Floats c = __builtin_shufflevector(pairs[2], pairs[3], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Floats d = __builtin_shufflevector(pairs[2], pairs[3], 2, 10, 3, 11, 6, 14, 7, 15);
+  columns[0] = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
+  columns[1] = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
+  columns[2] = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
+  columns[3] = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+
+/// to[lane] = (columns[0][lane], .. columns[3][lane]).
+inline __attribute__((always_inline)) void transpose(const Floats columns[4], float to[kLanes][4]) {
+  const Floats a = __builtin_shufflevector(columns[0], columns[1], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Floats b = __builtin_shufflevector(columns[0], columns[1], 2, 10, 3, 11, 6, 14, 7, 15);
+  const Floats c = __builtin_shufflevector(columns[2], columns[3], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Floats d = __builtin_shufflevector(columns[2], columns[3], 2, 10, 3, 11, 6, 14, 7, 15);
+  const Floats of_0_4 = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
+  const Floats of_1_5 = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Floats of_2_6 = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
+  const Floats of_3_7 = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
+  const auto put = [&](const Floats& pair, int lane) __attribute__((always_inline)) {
+    store(__builtin_shufflevector(pair, pair, 0, 1, 2, 3), to[lane]);
+    store(__builtin_shufflevector(pair, pair, 4, 5, 6, 7), to[lane + 4]);
+  };
+  put(of_0_4, 0);
+  put(of_1_5, 1);
+  put(of_2_6, 2);
+  put(of_3_7, 3);
+}
+
+}  // namespace roxel

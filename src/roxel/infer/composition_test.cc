@@ -1,0 +1,302 @@
+/// Rays cut and composed again (docs/rays.md), marched one by one and in packets.
+
+#include <gtest/gtest.h>
+
+#include "roxel/infer/infer_fixture.h"
+#include "roxel/infer/packet_march.h"
+#include "roxel/infer/passes.h"
+
+namespace roxel {
+namespace {
+
+using namespace fixture;
+
+/// A volume of one brick of another, with what the brick's voxels hold.
+struct Piece {
+  Volume volume;
+  std::vector<ColorTotals> totals;
+  std::uint32_t first_slot;  ///< in the other
+};
+
+Piece piece_of(const Volume& whole, const std::vector<ColorTotals>& totals, const Brick& brick) {
+  BrickMask mask;
+  for (int v = 0; v < kBrickVoxels; ++v) mask[v] = brick.local[v] != kNoVoxel;
+  Topology topology(whole.index(0).frame());
+  topology.insert_brick(brick.coord, mask);
+  Piece piece{Volume({topology}), {}, brick.first_slot};
+  for (std::uint32_t slot = 0; slot < brick.count; ++slot) {
+    piece.volume.tau[slot] = whole.tau[brick.first_slot + slot];
+    piece.totals.push_back(totals[brick.first_slot + slot]);
+  }
+  return piece;
+}
+
+/// Bricks along a ray, in its order.
+std::vector<std::uint32_t> bricks_along(const Volume& volume, const Ray& ray, Stretch range) {
+  std::vector<std::uint32_t> bricks;
+  const LatticeStack stack(volume);
+  stack.walk(
+      ray, range, [&](std::uint32_t brick) { bricks.push_back(brick); },
+      [](const VoxelStep&, const VoxelPlace&) { return true; });
+  return bricks;
+}
+
+class Composition : public ::testing::Test {
+ protected:
+  Composition() : random_(3), volume_(random_volume({3, 3, 3}, 0.7, 0.01, 0.6, random_)) {
+    std::uniform_real_distribution<float> color(-30, 60), unit(0, 1);
+    for (std::uint32_t slot = 0; slot < volume_.slot_count(); ++slot) {
+      totals_.push_back({});
+      const float m[3] = {color(random_), color(random_), color(random_)}, w = unit(random_);
+      totals_.back()[0] = std::llrint(w * kColorUnit);
+      for (int c = 0; c < 3; ++c) totals_.back()[1 + c] = std::llrint(w * m[c] * kColorUnit);
+      const float second[6] = {m[0] * m[0], m[1] * m[1], m[2] * m[2], m[0] * m[1], m[0] * m[2], m[1] * m[2]};
+      for (int c = 0; c < 6; ++c)
+        totals_.back()[4 + c] = std::llrint(w * (second[c] + (c < 3 ? 300 : 0)) * kColorUnit);
+    }
+    const PinholeCamera camera = camera_at({-14, 31, -11}, {12, 12, 12}, 16, 20);
+    view_ = view_of(camera, random_image(16, random_), plan_of({1, 80}, 0));
+  }
+
+  Segment march(const Ray& ray, const RegionStats& sample, Stretch range, EvaluatedSteps& steps) {
+    return march(volume_, totals_, ray, sample, range, steps);
+  }
+
+  Segment march(const Volume& volume, const std::vector<ColorTotals>& totals, const Ray& ray,
+                const RegionStats& sample, Stretch range, EvaluatedSteps& steps, bool early_stop = false) {
+    const LatticeStack stack(volume);
+    NodeScratch scratch(stack, volume.tau);
+    scratch.compare_with(totals);
+    SegmentMarch march(stack, scratch, model_, background_, filters_);
+    march.set_early_stop(early_stop);
+    march.set_depths(true);
+    RemovedColor removed;
+    return march.march(view_, {0, 0, 0}, sample, ray, range, nullptr, removed, steps);
+  }
+
+  /// One pixel's ray through the whole volume.
+  Segment march_alone(const Region& region, EvaluatedSteps& steps, bool early_stop = false) {
+    return march(volume_, totals_, region_ray(view_, region), view_.pyramid->at(0, region.x, region.y),
+                 view_.plan.range, steps, early_stop);
+  }
+
+  std::mt19937 random_;
+  Volume volume_;
+  std::vector<ColorTotals> totals_;
+  SampleView view_;
+  MatchModel model_;
+  Background background_;
+  SampleFilters filters_;
+};
+
+// Bricks may be anywhere: each marched alone and folded, they say what the whole volume says.
+TEST_F(Composition, CutAtBrickPlanesARayIsTheSameBitForBit) {
+  std::vector<Piece> pieces;
+  for (const Brick& brick : volume_.index(0).bricks()) pieces.push_back(piece_of(volume_, totals_, brick));
+  int cut_rays = 0;
+  for (int pixel = 0; pixel < 256; ++pixel) {
+    const int x = pixel % 16, y = pixel / 16;
+    const RegionStats sample = view_.pyramid->at(0, x, y);
+    const Ray ray = region_ray(view_, {0, x, y});
+    EvaluatedSteps whole_steps, piece_steps;
+    std::vector<std::uint32_t> piece_slots;
+    const Segment whole = march(ray, sample, view_.plan.range, whole_steps);
+    Segment folded;
+    const std::vector<std::uint32_t> bricks = bricks_along(volume_, ray, view_.plan.range);
+    for (const std::uint32_t brick : bricks) {
+      const Piece& piece = pieces[brick];
+      const std::size_t before = piece_steps.size();
+      folded = folded.then(march(piece.volume, piece.totals, ray, sample, view_.plan.range, piece_steps));
+      for (std::size_t s = before; s < piece_steps.size(); ++s)
+        piece_slots.push_back(piece_steps[s].slot + piece.first_slot);
+    }
+    cut_rays += bricks.size() > 2;
+    ASSERT_EQ(folded.transmittance, whole.transmittance);
+    ASSERT_EQ(folded.likelihood, whole.likelihood);
+    ASSERT_EQ(piece_steps.size(), whole_steps.size());
+    for (std::size_t s = 0; s < whole_steps.size(); ++s) {
+      ASSERT_EQ(piece_slots[s], whole_steps[s].slot);
+      ASSERT_EQ(piece_steps[s].length, whole_steps[s].length);
+      ASSERT_EQ(piece_steps.depth(s).middle, whole_steps.depth(s).middle);
+      ASSERT_EQ(piece_steps.depth(s).half_chord, whole_steps.depth(s).half_chord);
+      ASSERT_EQ(piece_steps[s].likelihood, whole_steps[s].likelihood);
+      ASSERT_EQ(piece_steps[s].weight, whole_steps[s].weight);
+    }
+  }
+  EXPECT_GT(cut_rays, 150);
+}
+
+TEST_F(Composition, CutAnywhereARayIsTheSameUpToRounding) {
+  std::uniform_real_distribution<double> depth(10, 60);
+  for (int pixel = 0; pixel < 256; ++pixel) {
+    const int x = pixel % 16, y = pixel / 16;
+    const RegionStats sample = view_.pyramid->at(0, x, y);
+    const Ray ray = region_ray(view_, {0, x, y});
+    const double cut = depth(random_);
+    EvaluatedSteps steps;
+    const Segment whole = march(ray, sample, view_.plan.range, steps);
+    const Segment front = march(ray, sample, {view_.plan.range.begin, cut}, steps);
+    const Segment back = march(ray, sample, {cut, view_.plan.range.end}, steps);
+    const Segment folded = front.then(back);
+    ASSERT_NEAR(folded.transmittance, whole.transmittance, 1e-5);
+    ASSERT_NEAR(folded.likelihood, whole.likelihood, 1e-5);
+  }
+}
+
+TEST_F(Composition, StoppingEarlyLeavesOutLessThanItsBound) {
+  for (float& tau : volume_.tau) tau = 3;
+  int stopped = 0;
+  for (int pixel = 0; pixel < 256; ++pixel) {
+    const int x = pixel % 16, y = pixel / 16;
+    const RegionStats sample = view_.pyramid->at(0, x, y);
+    const Ray ray = region_ray(view_, {0, x, y});
+    EvaluatedSteps all, some;
+    const Segment whole = march(ray, sample, view_.plan.range, all);
+    const LatticeStack stack(volume_);
+    NodeScratch scratch(stack, volume_.tau);
+    scratch.compare_with(totals_);
+    SegmentMarch march(stack, scratch, model_, background_, filters_);
+    RemovedColor removed;
+    const Segment early =
+        march.march(view_, {0, x, y}, sample, ray, view_.plan.range, nullptr, removed, some);
+    stopped += some.size() < all.size();
+    // Likelihoods are at most 1 + outlier, so what lies behind adds at most T < kNegligible Z.
+    ASSERT_LE(early.likelihood, whole.likelihood * (1 + 1e-6));
+    ASSERT_GE(early.likelihood * (1 + SegmentMarch::kNegligible) * (1 + 1e-6), whole.likelihood);
+    ASSERT_LE(std::abs(early.transmittance - whole.transmittance),
+              SegmentMarch::kNegligible * early.likelihood + 1e-7);
+  }
+  EXPECT_GT(stopped, 50);
+}
+
+/// Eight neighbouring pixels, (x, y) .. (x + 3, y + 1).
+struct Neighbours {
+  int x, y;
+  Region region(int lane) const { return {0, x + lane % 4, y + lane / 4}; }
+};
+
+class PacketComposition : public Composition {
+ protected:
+  /// Of one lane: what came out and the steps.
+  struct Lane {
+    Segment segment;
+    std::vector<EvaluatedStep> steps;
+  };
+
+  /// Marches the neighbours that `with` lets through, as one packet.
+  std::vector<Lane> march_packet(const Volume& volume, const std::vector<ColorTotals>& totals,
+                                 const Neighbours& neighbours, unsigned with = 0xff) {
+    const LatticeStack stack(volume);
+    NodeScratch scratch(stack, volume.tau);
+    scratch.compare_with(totals);
+    PacketMarch march(stack, scratch, model_);
+    LaneTerms terms;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const Region region = neighbours.region(lane);
+      terms.set(lane, sample_terms(view_.pyramid->at(0, region.x, region.y), model_));
+      if (with >> lane & 1) march.begin(lane, region_ray(view_, region), view_.plan.range, nullptr);
+    }
+    EvaluatedRows rows;
+    const PacketSegments segments = march.march(terms, rows);
+    std::vector<Lane> lanes(kLanes);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      lanes[lane].segment = segments.of(lane);
+      for (const EvaluatedRow* row = rows.data(); row != rows.data() + rows.size(); ++row)
+        if (row->length[lane] > 0)
+          lanes[lane].steps.push_back({row->slot[lane], row->length[lane], row->weight[lane],
+                                       row->opacity[lane], row->likelihood[lane], row->mean_path[lane]});
+      EXPECT_EQ(segments.steps[lane], lanes[lane].steps.size());
+    }
+    return lanes;
+  }
+
+  static bool same(const EvaluatedStep& a, const EvaluatedStep& b, std::uint32_t first_slot) {
+    return a.slot == b.slot + first_slot && a.length == b.length && a.weight == b.weight &&
+           a.opacity == b.opacity && a.likelihood == b.likelihood && a.mean_path == b.mean_path;
+  }
+};
+
+TEST_F(PacketComposition, LanesSayWhatSingleRaysSay) {
+  for (int block = 0; block < 32; ++block) {
+    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+    const std::vector<Lane> lanes = march_packet(volume_, totals_, neighbours);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const Region region = neighbours.region(lane);
+      EvaluatedSteps steps;
+      const Segment single = march_alone(region, steps);
+      ASSERT_NEAR(lanes[lane].segment.transmittance, single.transmittance, 1e-5);
+      ASSERT_NEAR(lanes[lane].segment.likelihood, single.likelihood, 1e-5 * (1 + single.likelihood));
+      ASSERT_EQ(lanes[lane].steps.size(), steps.size());
+      for (std::size_t s = 0; s < steps.size(); ++s) {
+        ASSERT_EQ(lanes[lane].steps[s].slot, steps[s].slot);
+        ASSERT_NEAR(lanes[lane].steps[s].length, steps[s].length, 1e-6);
+        ASSERT_NEAR(lanes[lane].steps[s].weight, steps[s].weight, 2e-5);
+        ASSERT_NEAR(lanes[lane].steps[s].opacity, steps[s].opacity, 1e-5 * steps[s].opacity + 1e-7);
+        ASSERT_NEAR(lanes[lane].steps[s].likelihood, steps[s].likelihood, 1e-5 * steps[s].likelihood);
+        ASSERT_NEAR(lanes[lane].steps[s].mean_path, steps[s].mean_path, 1e-5 * steps[s].mean_path + 1e-7);
+      }
+    }
+  }
+}
+
+// Which rays share a packet is nobody's business: the same bits alone as among others.
+TEST_F(PacketComposition, ALaneDoesNotDependOnTheOthers) {
+  for (int block = 0; block < 32; ++block) {
+    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+    const std::vector<Lane> together = march_packet(volume_, totals_, neighbours);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const Lane alone = march_packet(volume_, totals_, neighbours, 1u << lane)[lane];
+      ASSERT_EQ(alone.segment.transmittance, together[lane].segment.transmittance);
+      ASSERT_EQ(alone.segment.likelihood, together[lane].segment.likelihood);
+      ASSERT_EQ(alone.steps.size(), together[lane].steps.size());
+      for (std::size_t s = 0; s < alone.steps.size(); ++s)
+        ASSERT_TRUE(same(alone.steps[s], together[lane].steps[s], 0));
+    }
+  }
+}
+
+TEST_F(PacketComposition, CutAtBrickPlanesLanesAreTheSameBitForBit) {
+  for (float& tau : volume_.tau) tau *= 0.1f;  // no ray may stop early in the whole and not in its parts
+  std::vector<Piece> pieces;
+  for (const Brick& brick : volume_.index(0).bricks()) pieces.push_back(piece_of(volume_, totals_, brick));
+  for (int block = 0; block < 32; ++block) {
+    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+    const std::vector<Lane> whole = march_packet(volume_, totals_, neighbours);
+    std::vector<std::vector<Lane>> parts;
+    for (const Piece& piece : pieces) parts.push_back(march_packet(piece.volume, piece.totals, neighbours));
+    for (int lane = 0; lane < kLanes; ++lane) {
+      Segment folded;
+      std::size_t next = 0;
+      for (const std::uint32_t brick :
+           bricks_along(volume_, region_ray(view_, neighbours.region(lane)), view_.plan.range)) {
+        const Lane& part = parts[brick][lane];
+        folded = folded.then(part.segment);
+        for (const EvaluatedStep& step : part.steps)
+          ASSERT_TRUE(same(whole[lane].steps.at(next++), step, pieces[brick].first_slot));
+      }
+      ASSERT_EQ(next, whole[lane].steps.size());
+      ASSERT_EQ(folded.transmittance, whole[lane].segment.transmittance);
+      ASSERT_EQ(folded.likelihood, whole[lane].segment.likelihood);
+    }
+  }
+}
+
+TEST_F(PacketComposition, LanesStopWhereSingleRaysStop) {
+  for (float& tau : volume_.tau) tau = 3;
+  int stopped = 0;
+  for (int block = 0; block < 32; ++block) {
+    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+    const std::vector<Lane> lanes = march_packet(volume_, totals_, neighbours);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      EvaluatedSteps all, some;
+      march_alone(neighbours.region(lane), all);
+      march_alone(neighbours.region(lane), some, true);
+      stopped += some.size() < all.size();
+      ASSERT_EQ(lanes[lane].steps.size(), some.size());
+    }
+  }
+  EXPECT_GT(stopped, 50);
+}
+
+}  // namespace
+}  // namespace roxel

@@ -1,0 +1,67 @@
+#pragma once
+/// The opacity march of the posterior rule without filters, eight samples at a time. A tile's samples divide
+/// level by level, so that the samples of a packet are neighbours of one size.
+
+#include <vector>
+
+#include "roxel/infer/packet_march.h"
+#include "roxel/infer/passes.h"
+#include "roxel/infer/tiles.h"
+
+namespace roxel {
+
+class OpacityPackets {
+ public:
+  OpacityPackets(const LatticeStack& stack, const MarchOptions& options, NodeScratch& scratch)
+      : options_(options), march_(stack, scratch, options.model) {}
+  /// Whether the options are such that this march serves.
+  static bool serves(const MarchOptions& options);
+
+  /// Adds what the tile's root samples say to the scratch's voxels.
+  void tile(const ViewInSight& in_sight, const Tile& tile);
+
+  PassCounts counts;
+
+ private:
+  /// One sample of a tile; those that it divides into are samples_[first_child, end_child).
+  struct Sample {
+    Region region;
+    float weight;             ///< observation weight
+    Segment own = {};         ///< of its stretch
+    float behind = 0;         ///< leaves: p_bg; others: product of Z_c^{share}
+    float z = 0;              ///< of its own stretch and what is behind it
+    float reach = 0;          ///< probability of getting as far as its stretch
+    float transmittance = 1;  ///< of its stretch, as given out
+    bool ends = false;        ///< nothing is behind but background
+    int first_child = 0, end_child = 0;
+  };
+  /// Samples that were marched together, and their steps.
+  struct Packet {
+    int count = 0;
+    int sample[kLanes];
+    std::size_t first_row, end_row;
+  };
+  /// Samples and packets of one pyramid level.
+  struct Level {
+    std::size_t end_sample, end_packet;
+  };
+
+  static RegionStats stats_of(const SampleView& view, const Sample& sample);
+  void add(const SampleView& view, const Region& region);
+  void march_level(const ViewInSight& in_sight, std::size_t begin, Stretch range);
+  void march_packet(const SampleView& view, Packet& packet);
+  void divide(const SampleView& view, std::size_t index, bool last);
+  void look_behind(const SampleView& view);
+  void distribute();
+  void give_out(const Packet& packet);
+  void hand_on(const Sample& sample);
+
+  const MarchOptions& options_;
+  PacketMarch march_;
+  std::vector<Sample> samples_;
+  std::vector<Packet> packets_;
+  std::vector<Level> levels_;
+  EvaluatedRows rows_;
+};
+
+}  // namespace roxel
