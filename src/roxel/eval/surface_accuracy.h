@@ -1,0 +1,56 @@
+#pragma once
+/// A reconstructed surface against the true one, as the field measures it: accuracy and completeness
+/// [Seitz06], precision, recall and F-score [Knapitsch17] [Schoeps17]. docs/evaluation.md says what is counted.
+
+#include <optional>
+#include <string>
+
+#include "roxel/camera/camera.h"
+#include "roxel/eval/surface_distance.h"
+#include "roxel/image/image.h"
+
+namespace roxel {
+
+/// A camera and what it truly sees: depth along the optical axis, 1 channel, 0 = no surface.
+struct TrueView {
+  PinholeCamera camera;
+  Image depth;
+};
+
+/// Whether the point is the surface that the view shows: inside the image, and not behind the farthest of the
+/// four pixel centres around it by more than kDepthTolerance of its depth.
+bool is_seen(const TrueView& view, const Eigen::Vector3d& x);
+inline constexpr double kDepthTolerance = 0.003;  ///< half floats are good to 0.0005
+
+/// Counts of views that see each point. Views may be given a few at a time.
+void count_sightings(const TrueView& view, std::span<const Eigen::Vector3d> points, int threads,
+                     std::vector<int>& counts);
+
+/// At one distance.
+struct DistanceShares {
+  double distance = 0;   ///< world units
+  double precision = 0;  ///< share in [0, 1] of the estimate no farther than it from the truth
+  double recall = 0;     ///< share of the truth no farther than it from the estimate
+  double f_score = 0;    ///< harmonic mean of the two
+};
+
+struct SurfaceAccuracy {
+  std::int64_t estimate_points = 0;
+  std::int64_t truth_points = 0;
+  double accuracy_90 = 0;        ///< distance that 90 % of the estimate is within; 0 without an estimate
+  double mean_to_truth = 0;      ///< of the estimate's points
+  double median_to_truth = 0;
+  double mean_to_estimate = 0;   ///< of the truth's points; infinity without an estimate
+  double median_to_estimate = 0;
+  std::vector<DistanceShares> shares;
+};
+
+/// From distances that are known: of the estimate's points to the truth, and of the truth's to the estimate.
+/// Shares of nothing are 0.
+SurfaceAccuracy surface_accuracy(std::vector<double> to_truth, std::vector<double> to_estimate,
+                                 const std::vector<double>& distances);
+
+/// The q-quantile in [0, 1] by nearest rank; 0 of nothing. Reorders the values.
+double quantile(std::vector<double>& values, double q);
+
+}  // namespace roxel
