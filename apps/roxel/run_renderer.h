@@ -12,8 +12,9 @@
 namespace roxel::cli {
 
 struct RunRendererOptions {
-  std::optional<std::array<double, 3>> background_color;  ///< linear; none: the run's own where known, else black
-  bool surround = true;                                   ///< voxels around the box are seen, where the run has them
+  std::optional<std::array<double, 3>>
+      background_color;  ///< linear; none: the run's own where known, else black
+  bool surround = true;  ///< voxels around the box are seen, where the run has them
 };
 
 class RunRenderer {

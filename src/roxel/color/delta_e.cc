@@ -57,8 +57,7 @@ double delta_e_2000(const Lab& p, const Lab& q) {
   const double off_l = (l - 50) * (l - 50);
   const double s_l = 1 + 0.015 * off_l / std::sqrt(20 + off_l), s_c = 1 + 0.045 * c, s_h = 1 + 0.015 * c * t;
   const double blue = std::exp(-std::pow((h - 275) / 25, 2));
-  const double rotation =
-      -std::sin(60 * blue * kDegree) * 2 * std::sqrt(seventh(c) / (seventh(c) + k25To7));
+  const double rotation = -std::sin(60 * blue * kDegree) * 2 * std::sqrt(seventh(c) / (seventh(c) + k25To7));
   const double dl = step_l / s_l, dc = step_c / s_c, dh = step_h / s_h;
   return std::sqrt(dl * dl + dc * dc + dh * dh + rotation * dc * dh);
 }

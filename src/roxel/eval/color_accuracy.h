@@ -16,11 +16,11 @@ struct ColorPair {
 
 struct ColorAccuracy {
   std::int64_t pixels = 0;
-  double scale = 1;              ///< estimates times it are nearest to the truth, in least squares of linear RGB
-  double mean_delta_e = 0;       ///< CIEDE2000 [Sharma05] of the scaled estimate, white D65
+  double scale = 1;         ///< estimates times it are nearest to the truth, in least squares of linear RGB
+  double mean_delta_e = 0;  ///< CIEDE2000 [Sharma05] of the scaled estimate, white D65
   double median_delta_e = 0;
-  double delta_e_90 = 0;         ///< that 90 % of the pixels are within
-  double mean_relative = 0;      ///< |scaled estimate - truth| / |truth|, Euclidean in linear RGB
+  double delta_e_90 = 0;     ///< that 90 % of the pixels are within
+  double mean_relative = 0;  ///< |scaled estimate - truth| / |truth|, Euclidean in linear RGB
   double median_relative = 0;
 };
 

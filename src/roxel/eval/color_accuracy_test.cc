@@ -10,7 +10,8 @@ namespace roxel {
 namespace {
 
 TEST(ColorAccuracy, ABrighterLightIsNoError) {
-  const std::vector<ColorPair> pairs{{{0.2f, 0.4f, 0.6f}, {0.1f, 0.2f, 0.3f}}, {{0.8f, 0.1f, 0.2f}, {0.4f, 0.05f, 0.1f}}};
+  const std::vector<ColorPair> pairs{{{0.2f, 0.4f, 0.6f}, {0.1f, 0.2f, 0.3f}},
+                                     {{0.8f, 0.1f, 0.2f}, {0.4f, 0.05f, 0.1f}}};
   const ColorAccuracy found = color_accuracy(pairs);
   EXPECT_EQ(found.pixels, 2);
   EXPECT_NEAR(found.scale, 0.5, 1e-7);
@@ -26,7 +27,8 @@ TEST(ColorAccuracy, ByHand) {
   EXPECT_NEAR(found.mean_relative, (0.1 / 0.4 + 0.1 / 0.6) / 2, 1e-6);
   EXPECT_NEAR(found.median_relative, 0.1 / 0.6, 1e-6);
   const auto grey = [](double light) { return lab_from_xyz(xyz_from_rgb({light, light, light})); };
-  EXPECT_NEAR(found.delta_e_90, std::max(delta_e_2000(grey(0.5), grey(0.4)), delta_e_2000(grey(0.5), grey(0.6))), 1e-4);
+  EXPECT_NEAR(found.delta_e_90,
+              std::max(delta_e_2000(grey(0.5), grey(0.4)), delta_e_2000(grey(0.5), grey(0.6))), 1e-4);
 }
 
 TEST(ColorAccuracy, ATintIsAnError) {

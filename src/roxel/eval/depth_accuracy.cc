@@ -13,7 +13,8 @@ double share(std::int64_t part, std::int64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-void check(const DepthEstimate& estimate, std::span<const float> truth, const DepthAccuracyOptions& options) {
+void check(const EstimatedDepth& estimate, std::span<const float> truth,
+           const DepthAccuracyOptions& options) {
   ROXEL_CHECK_EQ(estimate.depth.size(), truth.size());
   if (!estimate.variance.empty()) ROXEL_CHECK_EQ(estimate.variance.size(), truth.size());
   if (!estimate.opacity.empty()) ROXEL_CHECK_EQ(estimate.opacity.size(), truth.size());
@@ -109,7 +110,7 @@ void DepthAccuracy::add(const DepthAccuracy& other) {
     normalized_errors[i] += other.normalized_errors[i];
 }
 
-DepthAccuracy depth_accuracy(const DepthEstimate& estimate, std::span<const float> truth,
+DepthAccuracy depth_accuracy(const EstimatedDepth& estimate, std::span<const float> truth,
                              const DepthAccuracyOptions& options) {
   check(estimate, truth, options);
   DepthAccuracy sums;

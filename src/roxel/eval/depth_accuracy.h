@@ -12,7 +12,7 @@
 namespace roxel {
 
 /// What a reconstruction says of one view.
-struct DepthEstimate {
+struct EstimatedDepth {
   std::span<const float> depth;
   std::span<const float> variance;  ///< of the depth, world units squared; empty = no calibration figures
   std::span<const float> opacity;   ///< of the ray, in [0, 1]; empty = 1 everywhere
@@ -68,7 +68,7 @@ struct DepthAccuracy {
 };
 
 /// Throws std::logic_error where sizes differ or options are out of range. Every share of nothing is 0.
-DepthAccuracy depth_accuracy(const DepthEstimate& estimate, std::span<const float> truth,
+DepthAccuracy depth_accuracy(const EstimatedDepth& estimate, std::span<const float> truth,
                              const DepthAccuracyOptions& options);
 
 /// One row of a table.

@@ -10,7 +10,8 @@ namespace {
 /// Whether the map has a depth near that of x, at the pixel that x falls on.
 bool agrees(const ViewDepth& view, const Eigen::Vector3d& x, double tolerance) {
   const Eigen::Vector3d uvz = view.camera.project(x);
-  if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.x() < view.depth.width() && uvz.y() >= 0 && uvz.y() < view.depth.height()))
+  if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.x() < view.depth.width() && uvz.y() >= 0 &&
+        uvz.y() < view.depth.height()))
     return false;
   const float z = *view.depth.pixel(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
   return z > 0 && std::abs(z - uvz.z()) <= tolerance;
@@ -26,8 +27,8 @@ bool enough_agree(const std::vector<ViewDepth>& views, std::size_t own, const Ei
 
 }  // namespace
 
-std::vector<Eigen::Vector3d> depth_points(const std::vector<ViewDepth>& views, const DepthPointOptions& options,
-                                          int threads) {
+std::vector<Eigen::Vector3d> depth_points(const std::vector<ViewDepth>& views,
+                                          const DepthPointOptions& options, int threads) {
   std::vector<std::vector<Eigen::Vector3d>> of_view(views.size());
   parallel_for(static_cast<std::int64_t>(views.size()), threads, [&](std::int64_t v, int) {
     const ViewDepth& view = views[v];

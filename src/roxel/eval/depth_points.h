@@ -15,12 +15,13 @@ struct ViewDepth {
 };
 
 struct DepthPointOptions {
-  int views_that_agree = 1;  ///< a pixel counts where the maps of so many views, its own one among them, agree
-  double tolerance = 0;      ///< how far depths may differ along the other view's axis to agree, world units
+  int views_that_agree =
+      1;                 ///< a pixel counts where the maps of so many views, its own one among them, agree
+  double tolerance = 0;  ///< how far depths may differ along the other view's axis to agree, world units
 };
 
 /// One point a pixel with depth, in the order of views and pixels.
-std::vector<Eigen::Vector3d> depth_points(const std::vector<ViewDepth>& views, const DepthPointOptions& options,
-                                          int threads);
+std::vector<Eigen::Vector3d> depth_points(const std::vector<ViewDepth>& views,
+                                          const DepthPointOptions& options, int threads);
 
 }  // namespace roxel

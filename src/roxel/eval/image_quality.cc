@@ -81,12 +81,18 @@ void check(const Image& render, const Image& photo, const Mask& counted) {
 
 double mean(double sum, double count) { return count > 0 ? sum / count : 0.0; }
 double total(const std::array<double, 3>& sums) { return sums[0] + sums[1] + sums[2]; }
-double decibels(double rms) { return rms > 0 ? -20 * std::log10(rms) : std::numeric_limits<double>::infinity(); }
+double decibels(double rms) {
+  return rms > 0 ? -20 * std::log10(rms) : std::numeric_limits<double>::infinity();
+}
 
 }  // namespace
 
-double ImageQuality::rms(int channel) const { return std::sqrt(mean(squared_sum[channel], static_cast<double>(pixels))); }
-double ImageQuality::rms() const { return std::sqrt(mean(total(squared_sum), 3.0 * static_cast<double>(pixels))); }
+double ImageQuality::rms(int channel) const {
+  return std::sqrt(mean(squared_sum[channel], static_cast<double>(pixels)));
+}
+double ImageQuality::rms() const {
+  return std::sqrt(mean(total(squared_sum), 3.0 * static_cast<double>(pixels)));
+}
 double ImageQuality::psnr(int channel) const { return decibels(rms(channel)); }
 double ImageQuality::psnr() const { return decibels(rms()); }
 double ImageQuality::ssim(int channel) const { return mean(ssim_sum[channel], static_cast<double>(windows)); }

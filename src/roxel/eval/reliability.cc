@@ -23,7 +23,9 @@ void Reliability::add(const Reliability& other) {
   }
 }
 
-std::int64_t Reliability::total() const { return std::accumulate(pixels.begin(), pixels.end(), std::int64_t{0}); }
+std::int64_t Reliability::total() const {
+  return std::accumulate(pixels.begin(), pixels.end(), std::int64_t{0});
+}
 
 double Reliability::mean_opacity(int bin) const {
   return pixels[bin] > 0 ? opacity_sum[bin] / static_cast<double>(pixels[bin]) : 0.0;
@@ -35,7 +37,8 @@ double Reliability::surface_share(int bin) const {
 
 double Reliability::expected_calibration_error() const {
   double sum = 0;
-  for (int bin = 0; bin < kBins; ++bin) sum += std::abs(opacity_sum[bin] - static_cast<double>(with_surface[bin]));
+  for (int bin = 0; bin < kBins; ++bin)
+    sum += std::abs(opacity_sum[bin] - static_cast<double>(with_surface[bin]));
   return total() > 0 ? sum / static_cast<double>(total()) : 0.0;
 }
 

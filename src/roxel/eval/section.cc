@@ -12,7 +12,8 @@ constexpr int kRight[3] = {1, 0, 0};
 constexpr int kUp[3] = {2, 2, 1};
 
 /// The end of an edge's crossing with the plane at height 0, from signed heights of unequal sign.
-Eigen::Vector3d crossing(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double height_a, double height_b) {
+Eigen::Vector3d crossing(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double height_a,
+                         double height_b) {
   return a + height_a / (height_a - height_b) * (b - a);
 }
 
@@ -38,7 +39,8 @@ Section opacity_section(const Volume& volume, int axis, double position) {
   return section;
 }
 
-std::vector<OutlinePiece> surface_outline(const Mesh& mesh, const Section& section, const LatticeFrame& frame) {
+std::vector<OutlinePiece> surface_outline(const Mesh& mesh, const Section& section,
+                                          const LatticeFrame& frame) {
   const int axis = section.axis, right = kRight[axis], up = kUp[axis];
   const auto in_picture = [&](const Eigen::Vector3d& x) {
     const Eigen::Vector3d voxels = (x - frame.origin) / frame.voxel_size;

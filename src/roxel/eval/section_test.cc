@@ -26,7 +26,8 @@ TEST(Section, ShowsAVoxelWhereItIs) {
     double position;
     int width, height, x, y;
   };
-  for (const Expected& e : {Expected{0, 10.7, 8, 16, 2, 12}, {1, 21.2, 8, 16, 1, 12}, {2, 31.8, 8, 8, 1, 5}}) {
+  for (const Expected& e :
+       {Expected{0, 10.7, 8, 16, 2, 12}, {1, 21.2, 8, 16, 1, 12}, {2, 31.8, 8, 8, 1, 5}}) {
     const Section section = opacity_section(volume, e.axis, e.position);
     EXPECT_EQ(section.opacity.width(), e.width);
     EXPECT_EQ(section.opacity.height(), e.height);
@@ -38,8 +39,10 @@ TEST(Section, ShowsAVoxelWhereItIs) {
 }
 
 TEST(Section, BesideTheVoxelOrTheBoxIsEmpty) {
-  for (const double position : {31.4, 32.1, 29.0, 99.0})
-    for (const float a : opacity_section(one_voxel(), 2, position).opacity.data()) EXPECT_EQ(a, 0);
+  for (const double position : {31.4, 32.1, 29.0, 99.0}) {
+    const Section section = opacity_section(one_voxel(), 2, position);
+    for (const float a : section.opacity.data()) EXPECT_EQ(a, 0);
+  }
 }
 
 TEST(Section, OutlineOfATriangle) {

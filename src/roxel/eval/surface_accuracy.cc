@@ -11,7 +11,9 @@ namespace roxel {
 namespace {
 
 double mean(const std::vector<double>& values) {
-  return values.empty() ? 0.0 : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return values.empty()
+             ? 0.0
+             : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 double share_within(const std::vector<double>& values, double limit) {
@@ -28,11 +30,13 @@ bool is_seen(const TrueView& view, const Eigen::Vector3d& x) {
   const Eigen::Vector3d uvz = view.camera.project(x);
   const int width = view.depth.width(), height = view.depth.height();
   if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.x() < width && uvz.y() >= 0 && uvz.y() < height)) return false;
-  const int left = static_cast<int>(std::floor(uvz.x() - 0.5)), top = static_cast<int>(std::floor(uvz.y() - 0.5));
+  const int left = static_cast<int>(std::floor(uvz.x() - 0.5)),
+            top = static_cast<int>(std::floor(uvz.y() - 0.5));
   float farthest = 0;
   for (int dy = 0; dy < 2; ++dy)
     for (int dx = 0; dx < 2; ++dx)
-      farthest = std::max(farthest, *view.depth.pixel(std::clamp(left + dx, 0, width - 1), std::clamp(top + dy, 0, height - 1)));
+      farthest = std::max(farthest, *view.depth.pixel(std::clamp(left + dx, 0, width - 1),
+                                                      std::clamp(top + dy, 0, height - 1)));
   return uvz.z() * (1 - kDepthTolerance) <= farthest;
 }
 

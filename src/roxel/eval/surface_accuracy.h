@@ -1,6 +1,7 @@
 #pragma once
 /// A reconstructed surface against the true one, as the field measures it: accuracy and completeness
-/// [Seitz06], precision, recall and F-score [Knapitsch17] [Schoeps17]. docs/evaluation.md says what is counted.
+/// [Seitz06], precision, recall and F-score [Knapitsch17] [Schoeps17]. docs/evaluation.md says what is
+/// counted.
 
 #include <optional>
 #include <string>
@@ -37,10 +38,10 @@ struct DistanceShares {
 struct SurfaceAccuracy {
   std::int64_t estimate_points = 0;
   std::int64_t truth_points = 0;
-  double accuracy_90 = 0;        ///< distance that 90 % of the estimate is within; 0 without an estimate
-  double mean_to_truth = 0;      ///< of the estimate's points
+  double accuracy_90 = 0;    ///< distance that 90 % of the estimate is within; 0 without an estimate
+  double mean_to_truth = 0;  ///< of the estimate's points
   double median_to_truth = 0;
-  double mean_to_estimate = 0;   ///< of the truth's points; infinity without an estimate
+  double mean_to_estimate = 0;  ///< of the truth's points; infinity without an estimate
   double median_to_estimate = 0;
   std::vector<DistanceShares> shares;
 };

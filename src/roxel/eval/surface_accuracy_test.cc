@@ -13,9 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 /// The square [0, 4] x [0, 4] at height z.
-Mesh square(double z) {
-  return {{{0, 0, z}, {4, 0, z}, {4, 4, z}, {0, 4, z}}, {{0, 1, 2}, {0, 2, 3}}};
-}
+Mesh square(double z) { return {{{0, 0, z}, {4, 0, z}, {4, 4, z}, {0, 4, z}}, {{0, 1, 2}, {0, 2, 3}}}; }
 
 SurfaceAccuracy of_meshes(const Mesh& estimate, const Mesh& truth, const std::vector<double>& distances) {
   const SurfaceSampling sampling{20000, 1, {}};
@@ -82,12 +80,12 @@ TrueView two_walls() {
 TEST(Visibility, OfWhatIsHiddenBehindOrOutside) {
   const TrueView view = two_walls();
   EXPECT_TRUE(is_seen(view, {1, 0, 5}));
-  EXPECT_TRUE(is_seen(view, {1, 0, 5.01}));    // within the tolerance
-  EXPECT_FALSE(is_seen(view, {1, 0, 5.03}));   // behind the wall
-  EXPECT_FALSE(is_seen(view, {-1, 0, 5}));     // behind the near wall
+  EXPECT_TRUE(is_seen(view, {1, 0, 5.01}));   // within the tolerance
+  EXPECT_FALSE(is_seen(view, {1, 0, 5.03}));  // behind the wall
+  EXPECT_FALSE(is_seen(view, {-1, 0, 5}));    // behind the near wall
   EXPECT_TRUE(is_seen(view, {-0.4, 0, 2}));
-  EXPECT_FALSE(is_seen(view, {4, 0, 5}));      // outside the image
-  EXPECT_FALSE(is_seen(view, {1, 0, -5}));     // behind the camera
+  EXPECT_FALSE(is_seen(view, {4, 0, 5}));   // outside the image
+  EXPECT_FALSE(is_seen(view, {1, 0, -5}));  // behind the camera
   std::vector<int> counts;
   const std::vector<Vector3d> points{{1, 0, 5}, {-1, 0, 5}};
   count_sightings(view, points, 1, counts);

@@ -14,7 +14,8 @@ namespace {
 /// nearest of all.
 constexpr double kSlack = 1 + 1e-5;
 
-Eigen::Vector3d closest_on_segment(const Eigen::Vector3d& x, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+Eigen::Vector3d closest_on_segment(const Eigen::Vector3d& x, const Eigen::Vector3d& a,
+                                   const Eigen::Vector3d& b) {
   const Eigen::Vector3d along = b - a;
   const double length_squared = along.squaredNorm();
   if (!(length_squared > 0)) return a;
@@ -26,8 +27,8 @@ float above(double value) { return std::nextafter(static_cast<float>(value), INF
 
 }  // namespace
 
-Eigen::Vector3d closest_on_triangle(const Eigen::Vector3d& x, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                                    const Eigen::Vector3d& c) {
+Eigen::Vector3d closest_on_triangle(const Eigen::Vector3d& x, const Eigen::Vector3d& a,
+                                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   // Inside the prism over the triangle it is the foot of the perpendicular; else it lies on an edge.
   const Eigen::Vector3d normal = (b - a).cross(c - a);
   const double squared = normal.squaredNorm();

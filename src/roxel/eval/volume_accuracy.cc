@@ -22,7 +22,8 @@ SavedVoxels saved_voxels(const Volume& volume, float opacity_threshold, float co
       const std::uint32_t slot = brick.first_slot + brick.local[v];
       const float alpha = alpha_from_tau(volume.tau[slot]);
       if (!(alpha >= opacity_threshold && volume.confidence[slot] >= confidence_threshold)) continue;
-      const Eigen::Vector3i in_brick(v % kBrickSide, v / kBrickSide % kBrickSide, v / (kBrickSide * kBrickSide));
+      const Eigen::Vector3i in_brick(v % kBrickSide, v / kBrickSide % kBrickSide,
+                                     v / (kBrickSide * kBrickSide));
       saved.centres.push_back(index.frame().voxel_centre(kBrickSide * brick.coord + in_brick));
       saved.opacity.push_back(alpha);
     }
@@ -61,8 +62,8 @@ VolumeAccuracy volume_accuracy(const std::vector<float>& opacity, const std::vec
     accuracy.weighted_opacity += weight * opacity[i];
   }
   accuracy.seen_points = static_cast<std::int64_t>(to_voxel.size());
-  accuracy.covered_points = std::count_if(to_voxel.begin(), to_voxel.end(),
-                                          [](double d) { return d <= VolumeAccuracy::kCover; });
+  accuracy.covered_points =
+      std::count_if(to_voxel.begin(), to_voxel.end(), [](double d) { return d <= VolumeAccuracy::kCover; });
   return accuracy;
 }
 

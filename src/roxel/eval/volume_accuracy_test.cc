@@ -20,7 +20,8 @@ TEST(VolumeAccuracy, ByHand) {
 }
 
 TEST(VolumeAccuracy, HistogramByHand) {
-  const VolumeAccuracy found = volume_accuracy({0.25f, 0.75f, 0.5f, 1.0f, 0.5f}, {0.1, 0.4, 0.5, 9.99, 10}, {});
+  const VolumeAccuracy found =
+      volume_accuracy({0.25f, 0.75f, 0.5f, 1.0f, 0.5f}, {0.1, 0.4, 0.5, 9.99, 10}, {});
   std::vector<std::int64_t> counts(found.histogram.voxels.begin(), found.histogram.voxels.end());
   std::vector<std::int64_t> expected(DistanceHistogram::kBins + 1, 0);
   expected[0] = 2;

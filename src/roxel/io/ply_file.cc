@@ -35,11 +35,11 @@ struct Header {
 
 std::optional<Number> number_type(std::string_view name) {
   static constexpr std::pair<const char*, Number> kNames[] = {
-      {"char", Number::kInt8},     {"int8", Number::kInt8},       {"uchar", Number::kUint8},
-      {"uint8", Number::kUint8},   {"short", Number::kInt16},     {"int16", Number::kInt16},
-      {"ushort", Number::kUint16}, {"uint16", Number::kUint16},   {"int", Number::kInt32},
-      {"int32", Number::kInt32},   {"uint", Number::kUint32},     {"uint32", Number::kUint32},
-      {"float", Number::kFloat32}, {"float32", Number::kFloat32}, {"double", Number::kFloat64},
+      {"char", Number::kInt8},      {"int8", Number::kInt8},       {"uchar", Number::kUint8},
+      {"uint8", Number::kUint8},    {"short", Number::kInt16},     {"int16", Number::kInt16},
+      {"ushort", Number::kUint16},  {"uint16", Number::kUint16},   {"int", Number::kInt32},
+      {"int32", Number::kInt32},    {"uint", Number::kUint32},     {"uint32", Number::kUint32},
+      {"float", Number::kFloat32},  {"float32", Number::kFloat32}, {"double", Number::kFloat64},
       {"float64", Number::kFloat64}};
   for (const auto& [text, type] : kNames)
     if (name == text) return type;
@@ -116,7 +116,8 @@ class HeaderReader {
         fail(line, "format, element, property, comment or end_header");
       }
     }
-    if (!has_format_) throw_invalid(path_.string(), "a header without a format line", "format ascii 1.0 or binary");
+    if (!has_format_)
+      throw_invalid(path_.string(), "a header without a format line", "format ascii 1.0 or binary");
     header_.size = at_;
     header_.lines = line_;
     return std::move(header_);
@@ -188,7 +189,11 @@ class HeaderReader {
 class Body {
  public:
   Body(const std::filesystem::path& path, std::string_view content, const Header& header)
-      : path_(path), content_(content), encoding_(header.encoding), at_(header.size), line_(header.lines + 1) {}
+      : path_(path),
+        content_(content),
+        encoding_(header.encoding),
+        at_(header.size),
+        line_(header.lines + 1) {}
 
   double number(Number type, const Property& property) {
     return encoding_ == Encoding::kAscii ? text_number(property) : binary_number(type, property);
@@ -255,7 +260,8 @@ class MeshReader {
   void check_size(const Element& element) const {
     std::size_t least = 0;
     for (const Property& property : element.properties)
-      least += header_.encoding == Encoding::kAscii ? 2 : size_of(property.list_count.value_or(property.type));
+      least +=
+          header_.encoding == Encoding::kAscii ? 2 : size_of(property.list_count.value_or(property.type));
     if (least > 0 && static_cast<double>(element.count - 1) * least > static_cast<double>(body_.bytes_left()))
       throw_invalid(path_.string(), std::to_string(body_.bytes_left()) + " bytes (cut off?)",
                     std::to_string(element.count) + " of element " + escaped(element.name));
@@ -277,7 +283,8 @@ class MeshReader {
       }
       const double value = body_.number(property.type, property);
       if (!vertex || property.name.size() != 1 || property.name[0] < 'x' || property.name[0] > 'z') continue;
-      if (!std::isfinite(value)) throw_invalid(body_.where() + ": " + property.name, "a value that is not finite", "a number");
+      if (!std::isfinite(value))
+        throw_invalid(body_.where() + ": " + property.name, "a value that is not finite", "a number");
       x[property.name[0] - 'x'] = value;
     }
     if (vertex) mesh_.points.push_back(x);
@@ -285,7 +292,8 @@ class MeshReader {
 
   void read_list(const Property& property, bool corners) {
     const double count = body_.number(*property.list_count, property);
-    if (!(count >= 0)) throw_invalid(body_.where() + ": " + property.name, std::to_string(count), "a length of 0 or more");
+    if (!(count >= 0))
+      throw_invalid(body_.where() + ": " + property.name, std::to_string(count), "a length of 0 or more");
     std::array<std::uint32_t, 3> triangle{};
     for (int i = 0; i < count; ++i) {
       const double index = body_.number(property.type, property);

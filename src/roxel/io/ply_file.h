@@ -1,7 +1,7 @@
 #pragma once
-/// Meshes and point sets as PLY [Turk94]: ascii and binary of either byte order. Of vertices x, y, z are read, of
-/// faces the list of vertex indices; polygons are cut into triangles as a fan from their first corner. All
-/// other elements and properties are passed over.
+/// Meshes and point sets as PLY [Turk94]: ascii and binary of either byte order. Of vertices x, y, z are
+/// read, of faces the list of vertex indices; polygons are cut into triangles as a fan from their first
+/// corner. All other elements and properties are passed over.
 
 #include <filesystem>
 

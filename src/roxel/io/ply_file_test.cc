@@ -53,10 +53,11 @@ std::string bytes_of(T value, bool big_endian) {
 }
 
 std::string binary_triangle(bool big) {
-  std::string file = std::string("ply\nformat binary_") + (big ? "big" : "little") +
-                     "_endian 1.0\nelement vertex 3\nproperty double x\nproperty float quality\nproperty float "
-                     "y\nproperty short z\nelement face 1\nproperty list uchar float other\nproperty list uchar "
-                     "ushort vertex_index\nend_header\n";
+  std::string file =
+      std::string("ply\nformat binary_") + (big ? "big" : "little") +
+      "_endian 1.0\nelement vertex 3\nproperty double x\nproperty float quality\nproperty float "
+      "y\nproperty short z\nelement face 1\nproperty list uchar float other\nproperty list uchar "
+      "ushort vertex_index\nend_header\n";
   for (const double x : {0.25, 1.5, -7.0})
     file += bytes_of(x, big) + bytes_of(9.0f, big) + bytes_of(static_cast<float>(2 * x), big) +
             bytes_of(std::int16_t{-3}, big);
@@ -90,7 +91,8 @@ TEST(PlyFile, ErrorsSayWhereAndWhat) {
   EXPECT_THAT(message_of("ply\nformat xml 1.0\n"), HasSubstr(":2: found 'xml', expected ascii"));
   EXPECT_THAT(message_of(head + "property float16 x\n"), HasSubstr(":4: found 'float16'"));
   EXPECT_THAT(message_of(head + kVertex), HasSubstr(":7: found the end of the file, expected end_header"));
-  EXPECT_THAT(message_of(head + "property float x\nproperty float y\nend_header\n1 2\n"), HasSubstr("without z"));
+  EXPECT_THAT(message_of(head + "property float x\nproperty float y\nend_header\n1 2\n"),
+              HasSubstr("without z"));
   EXPECT_THAT(message_of(head + kVertex + "end_header\n1 2\n"), HasSubstr("the end of the file, expected z"));
   EXPECT_THAT(message_of(head + kVertex + "end_header\n1 two 3\n"), HasSubstr(":8: y: found 'two'"));
   EXPECT_THAT(message_of(head + kVertex + "end_header\n1 nan 3\n"), HasSubstr(":8: y"));
@@ -101,7 +103,8 @@ TEST(PlyFile, ErrorsSayWhereAndWhat) {
   EXPECT_THAT(message_of(far), HasSubstr("vertex 4, expected vertices 0 to 3"));
   const std::string binary = binary_triangle(false);
   EXPECT_THAT(message_of(binary.substr(0, binary.size() - 1)), HasSubstr(": byte "));
-  EXPECT_THAT(message_of("ply\nformat ascii 1.0\nelement vertex 4000000000\n" + std::string(kVertex) + "end_header\n1 2 3\n"),
+  EXPECT_THAT(message_of("ply\nformat ascii 1.0\nelement vertex 4000000000\n" + std::string(kVertex) +
+                         "end_header\n1 2 3\n"),
               HasSubstr("6 bytes (cut off?), expected 4000000000 of element vertex"));
   EXPECT_THROW(read_ply(fs::path(testing::TempDir()) / "missing.ply"), InvalidInput);
 }

@@ -21,7 +21,9 @@ __attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ..
 /// The shortest text of a number, as a key.
 std::string key(double value) { return format("%g", value); }
 
-ordered_json finite(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
+ordered_json finite(double value) {
+  return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
+}
 
 ordered_json accuracy_json(const DepthAccuracy& accuracy) {
   ordered_json within, within_distance = ordered_json::object();
@@ -71,15 +73,18 @@ ordered_json calibration_json(const RunMeasures& measures) {
   return {{"calibrated_pixels", all.calibrated_pixels},
           {"coverage_68", all.share_within_sigma(1)},
           {"coverage_95", all.share_within_sigma(1.96)},
-          {"normalized_error_bins", {{"width_sigma", 1.0 / DepthAccuracy::kBinsPerSigma}, {"pixels", all.normalized_errors}}},
-          {"opacity", measures.opacity_reliability ? reliability_json(*measures.opacity_reliability) : ordered_json(nullptr)}};
+          {"normalized_error_bins",
+           {{"width_sigma", 1.0 / DepthAccuracy::kBinsPerSigma}, {"pixels", all.normalized_errors}}},
+          {"opacity", measures.opacity_reliability ? reliability_json(*measures.opacity_reliability)
+                                                   : ordered_json(nullptr)}};
 }
 
 ordered_json surface_json(const NamedSurfaceAccuracy& surface) {
   const SurfaceAccuracy& a = surface.accuracy;
   ordered_json at = ordered_json::array();
   for (const DistanceShares& s : a.shares)
-    at.push_back({{"distance", s.distance}, {"precision", s.precision}, {"recall", s.recall}, {"f_score", s.f_score}});
+    at.push_back(
+        {{"distance", s.distance}, {"precision", s.precision}, {"recall", s.recall}, {"f_score", s.f_score}});
   return {{"name", surface.name},
           {"points", a.estimate_points},
           {"accuracy_90", a.accuracy_90},
@@ -94,7 +99,8 @@ ordered_json volume_json(const RunMeasures& measures) {
   if (!measures.volume) return nullptr;
   const VolumeAccuracy& a = *measures.volume;
   ordered_json mean_opacity = ordered_json::array();
-  for (int bin = 0; bin <= DistanceHistogram::kBins; ++bin) mean_opacity.push_back(a.histogram.mean_opacity(bin));
+  for (int bin = 0; bin <= DistanceHistogram::kBins; ++bin)
+    mean_opacity.push_back(a.histogram.mean_opacity(bin));
   return {{"opacity_threshold", measures.opacity_threshold},
           {"voxels", a.voxels},
           {"share_within_4_voxels", a.share_close()},
@@ -108,7 +114,8 @@ ordered_json volume_json(const RunMeasures& measures) {
 }
 
 ordered_json quality_json(const ImageQuality& q) {
-  ordered_json json{{"pixels", q.pixels}, {"rms", q.rms()}, {"psnr_db", finite(q.psnr())}, {"ssim", q.ssim()}};
+  ordered_json json{
+      {"pixels", q.pixels}, {"rms", q.rms()}, {"psnr_db", finite(q.psnr())}, {"ssim", q.ssim()}};
   for (int c = 0; c < 3; ++c)
     json[std::string(1, "rgb"[c])] = {{"rms", q.rms(c)}, {"psnr_db", finite(q.psnr(c))}, {"ssim", q.ssim(c)}};
   return json;
@@ -119,7 +126,8 @@ ordered_json quality_json(const std::vector<NamedImageQuality>& views) {
   const NamedImageQuality total = total_quality(views);
   ordered_json list = ordered_json::array();
   for (const NamedImageQuality& view : views)
-    list.push_back({{"name", view.name}, {"object", quality_json(view.object)}, {"all", quality_json(view.all)}});
+    list.push_back(
+        {{"name", view.name}, {"object", quality_json(view.object)}, {"all", quality_json(view.all)}});
   return {{"object", quality_json(total.object)}, {"all", quality_json(total.all)}, {"views", list}};
 }
 
@@ -161,11 +169,13 @@ std::string depth_csv(const std::vector<NamedDepthAccuracy>& views) {
 }
 
 std::string surfaces_csv(const std::vector<NamedSurfaceAccuracy>& surfaces) {
-  std::string csv = "estimate,points,accuracy_90,mean_to_truth,mean_to_estimate,distance,precision,recall,f_score\n";
+  std::string csv =
+      "estimate,points,accuracy_90,mean_to_truth,mean_to_estimate,distance,precision,recall,f_score\n";
   for (const auto& [name, a] : surfaces)
     for (const DistanceShares& s : a.shares)
-      csv += cell(name) + format(",%lld,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", static_cast<long long>(a.estimate_points),
-                                 a.accuracy_90, a.mean_to_truth, a.mean_to_estimate, s.distance, s.precision, s.recall, s.f_score);
+      csv += cell(name) + format(",%lld,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
+                                 static_cast<long long>(a.estimate_points), a.accuracy_90, a.mean_to_truth,
+                                 a.mean_to_estimate, s.distance, s.precision, s.recall, s.f_score);
   return csv;
 }
 
@@ -183,7 +193,8 @@ std::string histogram_csv(const DistanceHistogram& histogram) {
 std::string quality_csv(const std::vector<NamedImageQuality>& views) {
   std::string csv = "view,over,pixels,rms,psnr_db,ssim,rms_r,rms_g,rms_b,ssim_r,ssim_g,ssim_b\n";
   const auto row = [&](const std::string& name, const char* over, const ImageQuality& q) {
-    csv += cell(name) + format(",%s,%lld,%.6g,%.6g,%.6g", over, static_cast<long long>(q.pixels), q.rms(), q.psnr(), q.ssim());
+    csv += cell(name) + format(",%s,%lld,%.6g,%.6g,%.6g", over, static_cast<long long>(q.pixels), q.rms(),
+                               q.psnr(), q.ssim());
     for (int c = 0; c < 3; ++c) csv += format(",%.6g", q.rms(c));
     for (int c = 0; c < 3; ++c) csv += format(",%.6g", q.ssim(c));
     csv += "\n";
@@ -203,7 +214,8 @@ std::string calibration_csv(const DepthAccuracy& all) {
   for (int bin = 0; bin < bins; ++bin) {
     const double width = 1.0 / DepthAccuracy::kBinsPerSigma;
     const std::string to = bin + 1 < bins ? key((bin + 1) * width) : "";
-    csv += format("%g,%s,%lld\n", bin * width, to.c_str(), static_cast<long long>(all.normalized_errors[bin]));
+    csv +=
+        format("%g,%s,%lld\n", bin * width, to.c_str(), static_cast<long long>(all.normalized_errors[bin]));
   }
   return csv;
 }
@@ -211,14 +223,16 @@ std::string calibration_csv(const DepthAccuracy& all) {
 std::string reliability_csv(const Reliability& curve) {
   std::string csv = "mean_opacity,share_with_surface,pixels\n";
   for (int bin = 0; bin < Reliability::kBins; ++bin)
-    csv += format("%.6g,%.6g,%lld\n", curve.mean_opacity(bin), curve.surface_share(bin), static_cast<long long>(curve.pixels[bin]));
+    csv += format("%.6g,%.6g,%lld\n", curve.mean_opacity(bin), curve.surface_share(bin),
+                  static_cast<long long>(curve.pixels[bin]));
   return csv;
 }
 
 std::string quality_text(const char* title, const std::vector<NamedImageQuality>& views) {
   if (views.empty()) return "";
   const NamedImageQuality total = total_quality(views);
-  std::string text = format("| %s (%zu) | RMS %% | PSNR dB | SSIM |\n|---|---:|---:|---:|\n", title, views.size());
+  std::string text =
+      format("| %s (%zu) | RMS %% | PSNR dB | SSIM |\n|---|---:|---:|---:|\n", title, views.size());
   for (const auto& [name, q] : {std::pair{"object", total.object}, {"all pixels", total.all}})
     text += format("| %s | %.2f | %.2f | %.4f |\n", name, 100 * q.rms(), q.psnr(), q.ssim());
   return text + "\n";
@@ -226,13 +240,17 @@ std::string quality_text(const char* title, const std::vector<NamedImageQuality>
 
 std::string surfaces_text(const RunMeasures& measures) {
   if (measures.surfaces.empty()) return "";
-  std::string head = "| surface | points | accuracy 90 % | within | precision % | recall % | F |\n|---|---:|---:|---:|---:|---:|---:|\n";
+  std::string head =
+      "| surface | points | accuracy 90 % | within | precision % | recall % | F "
+      "|\n|---|---:|---:|---:|---:|---:|---:|\n";
   for (const auto& [name, a] : measures.surfaces)
     for (std::size_t i = 0; i < a.shares.size(); ++i) {
       const DistanceShares& s = a.shares[i];
-      head += i == 0 ? format("| %s | %lld | %.4g", name.c_str(), static_cast<long long>(a.estimate_points), a.accuracy_90)
+      head += i == 0 ? format("| %s | %lld | %.4g", name.c_str(), static_cast<long long>(a.estimate_points),
+                              a.accuracy_90)
                      : std::string("| | | ");
-      head += format(" | %.4g | %.2f | %.2f | %.4f |\n", s.distance, 100 * s.precision, 100 * s.recall, s.f_score);
+      head += format(" | %.4g | %.2f | %.2f | %.4f |\n", s.distance, 100 * s.precision, 100 * s.recall,
+                     s.f_score);
     }
   return head + "\n";
 }
@@ -240,10 +258,12 @@ std::string surfaces_text(const RunMeasures& measures) {
 std::string volume_text(const RunMeasures& measures) {
   if (!measures.volume) return "";
   const VolumeAccuracy& a = *measures.volume;
-  return format("| voxels of opacity >= %g | within 4 voxels %% | weighted mean opacity %% | surface covered %% |\n|---:|---:|---:|---:|\n"
-                "| %lld | %.2f | %.2f | %.2f |\n\n",
-                measures.opacity_threshold, static_cast<long long>(a.voxels), 100 * a.share_close(),
-                100 * a.weighted_mean_opacity(), 100 * a.share_covered());
+  return format(
+      "| voxels of opacity >= %g | within 4 voxels %% | weighted mean opacity %% | surface covered %% "
+      "|\n|---:|---:|---:|---:|\n"
+      "| %lld | %.2f | %.2f | %.2f |\n\n",
+      measures.opacity_threshold, static_cast<long long>(a.voxels), 100 * a.share_close(),
+      100 * a.weighted_mean_opacity(), 100 * a.share_covered());
 }
 
 std::string calibration_text(const RunMeasures& measures) {
@@ -259,14 +279,18 @@ std::string calibration_text(const RunMeasures& measures) {
 
 std::string color_text(const std::optional<ColorAccuracy>& color) {
   if (!color) return "";
-  return format("colour against albedo: CIEDE2000 mean %.2f, median %.2f; relative error mean %.1f %%, median %.1f %% (scale %.4g)\n",
-                color->mean_delta_e, color->median_delta_e, 100 * color->mean_relative, 100 * color->median_relative, color->scale);
+  return format(
+      "colour against albedo: CIEDE2000 mean %.2f, median %.2f; relative error mean %.1f %%, median %.1f %% "
+      "(scale %.4g)\n",
+      color->mean_delta_e, color->median_delta_e, 100 * color->mean_relative, 100 * color->median_relative,
+      color->scale);
 }
 
 }  // namespace
 
 bool RunMeasures::empty() const {
-  return depth.empty() && reprojection.empty() && surfaces.empty() && !volume && images.empty() && held_out.empty() && !color;
+  return depth.empty() && reprojection.empty() && surfaces.empty() && !volume && images.empty() &&
+         held_out.empty() && !color;
 }
 
 DepthAccuracy total_depth(const std::vector<NamedDepthAccuracy>& views) {
@@ -301,7 +325,8 @@ ordered_json to_json(const RunMeasures& measures) {
   json["surface_samples"] = measures.surface_samples;
   json["surface_seen_by_two_views"] = measures.surface_seen;
   json["surfaces"] = ordered_json::array();
-  for (const NamedSurfaceAccuracy& surface : measures.surfaces) json["surfaces"].push_back(surface_json(surface));
+  for (const NamedSurfaceAccuracy& surface : measures.surfaces)
+    json["surfaces"].push_back(surface_json(surface));
   json["volume"] = volume_json(measures);
   json["images"] = quality_json(measures.images);
   json["held_out"] = quality_json(measures.held_out);
@@ -319,7 +344,8 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& m
     tables.emplace_back("depth.csv", depth_csv(measures.depth));
     tables.emplace_back("depth_error_over_sigma.csv", calibration_csv(total_depth(measures.depth)));
   }
-  if (measures.opacity_reliability) tables.emplace_back("opacity_reliability.csv", reliability_csv(*measures.opacity_reliability));
+  if (measures.opacity_reliability)
+    tables.emplace_back("opacity_reliability.csv", reliability_csv(*measures.opacity_reliability));
   if (!measures.surfaces.empty()) tables.emplace_back("surfaces.csv", surfaces_csv(measures.surfaces));
   if (measures.volume) tables.emplace_back("voxel_distances.csv", histogram_csv(measures.volume->histogram));
   if (!measures.images.empty()) tables.emplace_back("images.csv", quality_csv(measures.images));
@@ -331,12 +357,14 @@ std::string to_text(const RunMeasures& measures, std::size_t most_views) {
   std::string text;
   if (!measures.depth.empty()) {
     const bool few = measures.depth.size() <= most_views;
-    text += depth_accuracy_table(few ? measures.depth
-                                     : std::vector<NamedDepthAccuracy>{{"all views", total_depth(measures.depth)}}) +
+    text += depth_accuracy_table(
+                few ? measures.depth
+                    : std::vector<NamedDepthAccuracy>{{"all views", total_depth(measures.depth)}}) +
             "\n";
   }
   text += surfaces_text(measures) + volume_text(measures) + quality_text("images", measures.images) +
-          quality_text("held-out images", measures.held_out) + calibration_text(measures) + color_text(measures.color);
+          quality_text("held-out images", measures.held_out) + calibration_text(measures) +
+          color_text(measures.color);
   if (measures.reprojection_rms_percent)
     text += format("reprojection error %.2f %% of full scale\n", *measures.reprojection_rms_percent);
   for (const std::string& note : measures.notes) text += "note: " + note + "\n";

@@ -1,5 +1,6 @@
 #pragma once
-/// All that `roxel eval` measures of a run, and as JSON, CSV and text. docs/evaluation.md says what each figure is.
+/// All that `roxel eval` measures of a run, and as JSON, CSV and text. docs/evaluation.md says what each
+/// figure is.
 
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
@@ -33,7 +34,7 @@ struct RunMeasures {
   std::string run;
   std::optional<std::string> truth;
   double voxel_size = 0;
-  Eigen::AlignedBox3d box;  ///< of the run; surfaces count inside it
+  Eigen::AlignedBox3d box;                         ///< of the run; surfaces count inside it
   std::optional<double> reprojection_rms_percent;  ///< of summary.json, as are the next
   std::vector<std::pair<std::string, double>> reprojection;
 

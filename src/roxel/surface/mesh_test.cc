@@ -58,7 +58,8 @@ TEST(Mesh, NoSurfaceInTheBoxGivesNoSamples) {
 }
 
 TEST(Mesh, OnePointOfEachCellIsKept) {
-  const std::vector<Eigen::Vector3d> points{{0.1, 0, 0}, {0.2, 0, 0}, {0.6, 0, 0}, {-0.1, 0, 0}, {0.3, 0.9, 0}};
+  const std::vector<Eigen::Vector3d> points{
+      {0.1, 0, 0}, {0.2, 0, 0}, {0.6, 0, 0}, {-0.1, 0, 0}, {0.3, 0.9, 0}};
   const std::vector<Eigen::Vector3d> kept{{0.1, 0, 0}, {0.6, 0, 0}, {-0.1, 0, 0}, {0.3, 0.9, 0}};
   EXPECT_EQ(one_point_a_cell(points, 0.5), kept);
 }
