@@ -7,11 +7,19 @@
 #include "eval_measure.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
+#include "roxel/io/depth_file.h"
+#include "roxel/io/image_file.h"
+#include "roxel/report/html_report.h"
+#include "roxel/report/measure_plots.h"
+#include "roxel/report/pictures.h"
+#include "roxel/report/section_picture.h"
 
 namespace roxel::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr Response kAsItIs{ResponseCurve::kLinear};
 
 struct TruthOptions {
   std::optional<std::string> truth;
@@ -141,8 +149,46 @@ void check_measured(const EvalOptions& options, const RunMeasures& measures) {
                   "--truth DIR, or a run with renders");
 }
 
-void write_files(const fs::path& folder, const RunMeasures& measures, const std::string& json) {
+/// Pictures that the run has of the views that the page shows, and the photographs where they are there.
+std::vector<ReportView> report_views_of(const EvalSource& source) {
+  std::vector<ReportView> views;
+  for (const int v : report_views(static_cast<int>(source.view_names.size()))) {
+    const std::string& name = source.view_names[v];
+    ReportView shown{name, {}, {}};
+    if (const View* view = source.view(name))
+      shown.pictures.push_back(report_picture(
+          "photograph", encoded_picture(source.input->load(*view).rgb, source.run.file.info.exposure,
+                                        source.picture_response())));
+    for (const char* kind : {"render", "error", "depth"})
+      if (const fs::path file = view_path(source.run.path, kind, name, ".png"); fs::is_regular_file(file))
+        shown.pictures.push_back(report_picture(kind, read_image(file.string(), kAsItIs).rgb));
+    if (const fs::path file = depth_path(source.run.path, name); fs::is_regular_file(file)) {
+      const DepthLayers layers = read_depth(file);
+      shown.pictures.push_back(
+          report_picture("sigma of depth",
+                         sigma_picture(layers.variance, layers.depth, layers.opacity, source.voxel_size())));
+    }
+    if (!shown.pictures.empty()) views.push_back(std::move(shown));
+  }
+  return views;
+}
+
+std::string report_page(const EvalSource& source, const RunMeasures& measures) {
+  ReportContent content{
+      nlohmann::ordered_json(source.run.summary), report_views_of(source), measures.sections, {}, &measures};
+  content.opacities = saved_voxels(source.run.file.volume, 0, 0).opacity;
+  return html_report(content);
+}
+
+void write_files(const fs::path& folder, const EvalSource& source, const RunMeasures& measures,
+                 const std::string& json) {
   for (const auto& [name, table] : csv_tables(measures)) write_text_atomically(folder / name, table);
+  for (const auto& [name, plot] : measure_plots(measures))
+    write_text_atomically(folder / (name + ".svg"), svg_plot(plot));
+  for (const Section& section : measures.sections)
+    write_text_atomically(folder / (std::string("section_") + "xyz"[section.axis] + ".svg"),
+                          section_svg(section));
+  write_text_atomically(folder / "report.html", report_page(source, measures));
   write_text_atomically(folder / "metrics.json", json + "\n");
 }
 
@@ -159,7 +205,7 @@ int run_eval(const Invocation& invocation, const EvalOptions& options) {
   const RunMeasures measures = measure(source, wanted, session);
   check_measured(options, measures);
   const std::string json = json_text(to_json(measures));
-  if (folder) write_files(folder->path(), measures, json);
+  if (folder) write_files(folder->path(), source, measures, json);
   session.display().clear();
   print_result(options.common, to_text(measures), json);
   return 0;

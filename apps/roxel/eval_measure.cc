@@ -20,8 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr Response kAsItIs{ResponseCurve::kLinear};
-constexpr float kHasDepth = 0.5f;         ///< opacity above which a pixel's depth counts
-constexpr float kConfident = 0.001f;      ///< below it no photograph has seen a voxel
+constexpr float kHasDepth = 0.5f;     ///< opacity above which a pixel's depth counts
+constexpr float kConfident = 0.001f;  ///< below it no photograph has seen a voxel
 constexpr std::size_t kMostColorPixels = 2000000;
 
 /// One view as far as its files are there.
@@ -98,7 +98,9 @@ class Measurement {
     samples_ = sample_surface(*source_.surface, {options_.samples, options_.seed, source_.box});
     sightings_.assign(samples_.size(), 0);
     out_.surface_samples = static_cast<std::int64_t>(samples_.size());
-    if (samples_.empty()) out_.notes.push_back("no surface of " + (*source_.truth / "mesh.ply").string() + " is in the run's box");
+    if (samples_.empty())
+      out_.notes.push_back("no surface of " + (*source_.truth / "mesh.ply").string() +
+                           " is in the run's box");
   }
 
   void measure_views() {
@@ -147,12 +149,14 @@ class Measurement {
       if (is_seen(view, samples_[i])) std::atomic_ref(sightings_[i]).fetch_add(1, std::memory_order_relaxed);
   }
 
-  void measure_depth(const std::string& name, const DepthLayers& estimate, const Image& truth, MeasuredView& out) const {
+  void measure_depth(const std::string& name, const DepthLayers& estimate, const Image& truth,
+                     MeasuredView& out) const {
     DepthAccuracyOptions options;
     options.voxel_size = source_.voxel_size();
     options.distances = options_.depth_within;
-    out.depth = {name, depth_accuracy({estimate.depth.data(), estimate.variance.data(), estimate.opacity.data()},
-                                      truth.data(), options)};
+    out.depth = {name,
+                 depth_accuracy({estimate.depth.data(), estimate.variance.data(), estimate.opacity.data()},
+                                truth.data(), options)};
     out.reliability = reliability(estimate.opacity.data(), truth.data());
   }
 
@@ -176,14 +180,15 @@ class Measurement {
     Mask object(photo.rgb.width(), photo.rgb.height());
     for (std::size_t i = 0; i < object.data().size(); ++i) {
       const bool valid = photo.valid.empty() || photo.valid.data()[i] > 0;
-      const bool shown = !photo.foreground.empty() ? photo.foreground.data()[i] >= 128
-                                                   : !planes || (*planes)[i] > above;
+      const bool shown =
+          !photo.foreground.empty() ? photo.foreground.data()[i] >= 128 : !planes || (*planes)[i] > above;
       object.data()[i] = valid && shown ? 255 : 0;
     }
     return object;
   }
 
-  std::optional<NamedImageQuality> measure_render(const View& view, const DepthLayers* estimate, const Image& truth) const {
+  std::optional<NamedImageQuality> measure_render(const View& view, const DepthLayers* estimate,
+                                                  const Image& truth) const {
     const fs::path file = view_path(source_.run.path, "render", view.name, ".png");
     if (!fs::is_regular_file(file)) return {};
     const Image render = read_image(file.string(), kAsItIs).rgb;
@@ -192,10 +197,12 @@ class Measurement {
     return quality(view.name, render, photo, object_pixels(photo, estimate, truth));
   }
 
-  NamedImageQuality quality(const std::string& name, Image render, const Photograph& photo, const Mask& object) const {
+  NamedImageQuality quality(const std::string& name, Image render, const Photograph& photo,
+                            const Mask& object) const {
     Image shown = encoded_picture(photo.rgb, source_.run.file.info.exposure, source_.picture_response());
     for (std::size_t i = 0; i < photo.valid.data().size(); ++i)
-      if (photo.valid.data()[i] == 0) std::fill_n(&shown.data()[3 * i], 3, 0.0f), std::fill_n(&render.data()[3 * i], 3, 0.0f);
+      if (photo.valid.data()[i] == 0)
+        std::fill_n(&shown.data()[3 * i], 3, 0.0f), std::fill_n(&render.data()[3 * i], 3, 0.0f);
     return {name, image_quality(render, shown, object), image_quality(render, shown, photo.valid)};
   }
 
@@ -207,16 +214,20 @@ class Measurement {
       out_.notes.push_back("no true depth with cameras: all of the true surface in the box counts as seen");
       seen_ = samples_;
     }
-    if (!samples_.empty()) out_.surface_seen = static_cast<double>(seen_.size()) / static_cast<double>(samples_.size());
+    if (!samples_.empty())
+      out_.surface_seen = static_cast<double>(seen_.size()) / static_cast<double>(samples_.size());
   }
 
   std::vector<double> distances() const {
-    return options_.distances.empty() ? default_distances(out_.box_diagonal(), out_.voxel_size) : options_.distances;
+    return options_.distances.empty() ? default_distances(out_.box_diagonal(), out_.voxel_size)
+                                      : options_.distances;
   }
 
   void measure_surfaces() {
     if (seen_.empty()) {
-      if (options_.estimate) throw_invalid("--estimate " + *options_.estimate, "no true surface to measure it by", "a truth with mesh.ply");
+      if (options_.estimate)
+        throw_invalid("--estimate " + *options_.estimate, "no true surface to measure it by",
+                      "a truth with mesh.ply");
       return;
     }
     truth_distance_.emplace(*source_.surface);
@@ -227,7 +238,8 @@ class Measurement {
       add_points("depth points that " + std::to_string(options_.views_agree) + " views agree on",
                  one_point_a_cell(depth_points(estimates_, agreeing, threads_), cell));
     }
-    saved_ = saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold), kConfident);
+    saved_ =
+        saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold), kConfident);
     add_points("voxels", saved_.centres);
     if (options_.estimate) add_estimate(*options_.estimate);
   }
@@ -248,7 +260,8 @@ class Measurement {
   void add_surface(const std::string& name, const std::vector<Eigen::Vector3d>& points, Mesh mesh) {
     std::vector<double> to_truth = truth_distance_->of(points, threads_);
     std::vector<double> to_estimate = SurfaceDistance(std::move(mesh)).of(seen_, threads_);
-    out_.surfaces.push_back({name, surface_accuracy(std::move(to_truth), std::move(to_estimate), distances())});
+    out_.surfaces.push_back(
+        {name, surface_accuracy(std::move(to_truth), std::move(to_estimate), distances())});
   }
 
   void measure_volume() {
@@ -273,7 +286,8 @@ class Measurement {
       session_.context().throw_if_cancelled();
       const Rendering rendering = renderer()(view, session_.context());
       const Photograph photo = source_.held_out->load(view);
-      out_.held_out.push_back(quality(view.name, encoded_picture(rendering.rgb, 1, source_.picture_response()), photo,
+      out_.held_out.push_back(quality(view.name,
+                                      encoded_picture(rendering.rgb, 1, source_.picture_response()), photo,
                                       object_mask(photo, rendering.opacity)));
     }
   }
@@ -296,7 +310,8 @@ class Measurement {
     out_.color = color_accuracy(pairs);
   }
 
-  void add_color_pairs(const View& view, const fs::path& file, std::size_t stride, std::vector<ColorPair>& pairs) {
+  void add_color_pairs(const View& view, const fs::path& file, std::size_t stride,
+                       std::vector<ColorPair>& pairs) {
     session_.context().throw_if_cancelled();
     const Image albedo = read_image(file.string(), kAsItIs).rgb;
     const Rendering rendering = renderer()(view, session_.context());
@@ -350,7 +365,8 @@ class Measurement {
 }  // namespace
 
 std::vector<double> default_distances(double diagonal, double voxel_size) {
-  std::vector<double> distances{0.005 * diagonal, 0.01 * diagonal, voxel_size, 2 * voxel_size, 4 * voxel_size};
+  std::vector<double> distances{0.005 * diagonal, 0.01 * diagonal, voxel_size, 2 * voxel_size,
+                                4 * voxel_size};
   std::sort(distances.begin(), distances.end());
   return distances;
 }

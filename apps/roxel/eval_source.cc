@@ -41,7 +41,8 @@ InputOptions input_options(const FinishedRun& run) {
 void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSource& source) {
   const std::string path = paths.dataset.value_or(source.run.file.info.dataset);
   if (path.empty() || (!paths.dataset && !fs::exists(path))) {
-    source.notes.push_back("the run's data set " + path + " is not there: cameras and photographs are not known (--dataset)");
+    source.notes.push_back("the run's data set " + path +
+                           " is not there: cameras and photographs are not known (--dataset)");
     return;
   }
   source.input = read_input(path, input_options(source.run), session);
@@ -61,7 +62,8 @@ std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& s
 }
 
 void read_held_out(const Session& session, EvalSource& source) {
-  for (const fs::path& folder : {source.truth.value_or(""), source.input ? fs::path(source.input->dataset.path) : fs::path()}) {
+  for (const fs::path& folder :
+       {source.truth.value_or(""), source.input ? fs::path(source.input->dataset.path) : fs::path()}) {
     const fs::path file = folder / "transforms_test.json";
     if (folder.empty() || !fs::is_regular_file(file)) continue;
     InputOptions options = input_options(source.run);
@@ -104,7 +106,8 @@ EvalSource read_eval_source(const EvalPaths& paths, const Session& session) {
   source.box = box_of(source.run);
   read_dataset_of_run(paths, session, source);
   source.truth = truth_folder(paths, source);
-  if (source.truth && fs::is_regular_file(*source.truth / "mesh.ply")) source.surface = read_ply(*source.truth / "mesh.ply");
+  if (source.truth && fs::is_regular_file(*source.truth / "mesh.ply"))
+    source.surface = read_ply(*source.truth / "mesh.ply");
   read_held_out(session, source);
   session.context().throw_if_cancelled();
   return source;

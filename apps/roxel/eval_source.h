@@ -1,5 +1,6 @@
 #pragma once
-/// What `roxel eval` reads: a finished run, its photographs and cameras where they are still there, and the truth.
+/// What `roxel eval` reads: a finished run, its photographs and cameras where they are still there, and the
+/// truth.
 
 #include <map>
 #include <memory>
@@ -18,12 +19,12 @@ struct EvalPaths {
 
 struct EvalSource {
   FinishedRun run;
-  std::vector<std::string> view_names;     ///< of the run
-  Eigen::AlignedBox3d box;                 ///< that was asked for
-  std::optional<Input> input;              ///< the run's data set
+  std::vector<std::string> view_names;       ///< of the run
+  Eigen::AlignedBox3d box;                   ///< that was asked for
+  std::optional<Input> input;                ///< the run's data set
   std::map<std::string, const View*> views;  ///< of it, by name
   std::optional<std::filesystem::path> truth;
-  std::optional<Mesh> surface;  ///< truth/mesh.ply
+  std::optional<Mesh> surface;    ///< truth/mesh.ply
   std::optional<Input> held_out;  ///< views of transforms_test.json
   std::vector<std::string> notes;
 
@@ -41,7 +42,8 @@ bool has_truth(const std::filesystem::path& folder);
 std::optional<std::filesystem::path> truth_file(const std::filesystem::path& truth, const std::string& kind,
                                                 const std::string& name);
 
-/// Throws InvalidInput for what was named and is missing or broken. What the run's own data set lacks is noted.
+/// Throws InvalidInput for what was named and is missing or broken. What the run's own data set lacks is
+/// noted.
 EvalSource read_eval_source(const EvalPaths& paths, const Session& session);
 
 }  // namespace roxel::cli

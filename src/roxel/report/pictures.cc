@@ -13,6 +13,7 @@ using Color = std::array<float, 3>;
 
 constexpr int kGap = 6;
 constexpr float kSheetGrey = 0.12f;
+constexpr float kNoSigmaGrey = 0.75f;
 
 /// Far to near.
 constexpr std::array<Color, 7> kDepthColors{{{0.13f, 0.14f, 0.36f},
@@ -120,6 +121,18 @@ Image error_picture(const Image& render, const Image& photo, const Mask& valid, 
         squared += difference * difference / 3;
       }
       const Color color = blend(kHeatColors, std::sqrt(squared) / kHottestError);
+      std::copy(color.begin(), color.end(), picture.pixel(x, y));
+    }
+  return picture;
+}
+
+Image sigma_picture(const Image& variance, const Image& depth, const Image& opacity, double voxel_size) {
+  Image picture(variance.width(), variance.height(), 3, kNoSigmaGrey);
+  for (int y = 0; y < picture.height(); ++y)
+    for (int x = 0; x < picture.width(); ++x) {
+      if (!has_depth(depth, opacity, x, y)) continue;
+      const float sigma = std::sqrt(std::max(0.0f, *variance.pixel(x, y))) / static_cast<float>(voxel_size);
+      const Color color = blend(kHeatColors, sigma / kHottestSigma);
       std::copy(color.begin(), color.end(), picture.pixel(x, y));
     }
   return picture;

@@ -34,6 +34,13 @@ inline constexpr float kHottestError = 0.25f;
 /// black.
 Image error_picture(const Image& render, const Image& photo, const Mask& valid, const Mask& foreground);
 
+/// Deviation at which the heat is white, in voxels.
+inline constexpr float kHottestSigma = 4;
+
+/// The deviation of depths as heat: black (sure), violet, red, yellow, white (kHottestSigma voxels and more).
+/// Grey where a pixel has no depth, or is not more opaque than one half.
+Image sigma_picture(const Image& variance, const Image& depth, const Image& opacity, double voxel_size);
+
 /// The picture at most `width` wide, averaged over areas; never enlarged.
 Image thumbnail(const Image& picture, int width);
 

@@ -102,6 +102,20 @@ TEST(ErrorPicture, IsTheRootMeanSquareOverTheChannels) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.pixel(0, 0)[c], b.pixel(0, 0)[c], 1e-4);
 }
 
+TEST(SigmaPicture, IsBlackWhereDepthIsSureAndGreyWhereThereIsNone) {
+  Image depth(4, 1, 1, 2.0f), opacity(4, 1, 1, 1.0f), variance(4, 1, 1);
+  const float voxel = 0.5f;
+  *variance.pixel(1, 0) = std::pow(kHottestSigma / 2 * voxel, 2.0f);
+  *variance.pixel(2, 0) = std::pow(kHottestSigma * voxel, 2.0f);
+  *depth.pixel(3, 0) = 0;
+  const Image heat = sigma_picture(variance, depth, opacity, voxel);
+  EXPECT_EQ(brightness(heat.pixel(0, 0)), 0);
+  EXPECT_GT(brightness(heat.pixel(1, 0)), 0.5f);
+  EXPECT_LT(brightness(heat.pixel(1, 0)), 2);
+  EXPECT_NEAR(brightness(heat.pixel(2, 0)), 3, 1e-4);
+  EXPECT_NEAR(brightness(heat.pixel(3, 0)), 3 * 0.75f, 1e-4);
+}
+
 TEST(Thumbnail, AveragesAreasAndNeverEnlarges) {
   Image picture(6, 4, 3);
   for (int y = 0; y < 4; ++y)
