@@ -123,7 +123,6 @@ MeasureOptions measure_options(const MeasureSwitches& switches) {
   MeasureOptions options;
   options.depth_within = parse_distances(switches.depth_within, "--depth-within");
   options.distances = parse_distances(switches.distances, "--distances");
-  options.estimate = switches.estimate;
   options.opacity_threshold = switches.opacity_threshold;
   options.views_agree = switches.views_agree;
   options.samples = switches.samples;
@@ -195,8 +194,9 @@ void write_files(const fs::path& folder, const EvalSource& source, const RunMeas
 int run_eval(const Invocation& invocation, const EvalOptions& options) {
   Session session(options.common);
   const MeasureOptions wanted = measure_options(options.measures);
-  const EvalSource source =
-      read_eval_source({invocation.inputs.front(), options.truth.truth, options.truth.dataset}, session);
+  const EvalSource source = read_eval_source(
+      {invocation.inputs.front(), options.truth.truth, options.truth.dataset, options.measures.estimate},
+      session);
   std::optional<OutputFolder> folder;
   if (!invocation.output.empty()) {
     protect_sources(invocation.output, sources_of(source));

@@ -94,8 +94,10 @@ class Measurement {
   }
 
   void draw_samples() {
-    if (!source_.surface || source_.surface->is_point_set()) return;
-    samples_ = sample_surface(*source_.surface, {options_.samples, options_.seed, source_.box});
+    if (!source_.surface) return;
+    samples_ = source_.surface->is_point_set()
+                   ? points_in_box(source_.surface->points, source_.box)
+                   : sample_surface(*source_.surface, {options_.samples, options_.seed, source_.box});
     sightings_.assign(samples_.size(), 0);
     out_.surface_samples = static_cast<std::int64_t>(samples_.size());
     if (samples_.empty())
@@ -224,12 +226,7 @@ class Measurement {
   }
 
   void measure_surfaces() {
-    if (seen_.empty()) {
-      if (options_.estimate)
-        throw_invalid("--estimate " + *options_.estimate, "no true surface to measure it by",
-                      "a truth with mesh.ply");
-      return;
-    }
+    if (seen_.empty()) return;
     truth_distance_.emplace(*source_.surface);
     const double cell = out_.voxel_size / 2;
     if (!estimates_.empty()) {
@@ -241,7 +238,7 @@ class Measurement {
     saved_ =
         saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold), kConfident);
     add_points("voxels", saved_.centres);
-    if (options_.estimate) add_estimate(*options_.estimate);
+    if (source_.estimate) add_estimate(*source_.estimate);
   }
 
   void add_points(const std::string& name, std::vector<Eigen::Vector3d> points) {
@@ -250,11 +247,10 @@ class Measurement {
     add_surface(name, inside, Mesh{std::move(points), {}});
   }
 
-  void add_estimate(const std::string& file) {
-    Mesh mesh = read_ply(file);
-    if (mesh.is_point_set()) return add_points(fs::path(file).filename().string(), std::move(mesh.points));
-    const auto points = sample_surface(mesh, {options_.samples, options_.seed, source_.box});
-    add_surface(fs::path(file).filename().string(), points, std::move(mesh));
+  void add_estimate(const Mesh& mesh) {
+    if (mesh.is_point_set()) return add_points(source_.estimate_name, mesh.points);
+    add_surface(source_.estimate_name, sample_surface(mesh, {options_.samples, options_.seed, source_.box}),
+                mesh);
   }
 
   void add_surface(const std::string& name, const std::vector<Eigen::Vector3d>& points, Mesh mesh) {

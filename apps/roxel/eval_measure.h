@@ -9,10 +9,9 @@ namespace roxel::cli {
 struct MeasureOptions {
   std::vector<double> depth_within;  ///< world units
   std::vector<double> distances;     ///< of precision and recall, world units; empty: see default_distances
-  std::optional<std::string> estimate;  ///< a PLY file to measure, too
-  double opacity_threshold = 0.04;      ///< of voxels that count as saved
-  int views_agree = 2;                  ///< for the second set of depth points
-  int samples = 200000;                 ///< of the true surface
+  double opacity_threshold = 0.04;   ///< of voxels that count as saved
+  int views_agree = 2;               ///< for the second set of depth points
+  int samples = 200000;              ///< of the true surface
   std::uint64_t seed = 1;
   std::optional<std::array<double, 3>> section;  ///< point that the sections go through
 };

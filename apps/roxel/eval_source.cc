@@ -61,6 +61,17 @@ std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& s
   return {};
 }
 
+void read_surfaces(const EvalPaths& paths, EvalSource& source) {
+  if (source.truth && fs::is_regular_file(*source.truth / "mesh.ply"))
+    source.surface = read_ply(*source.truth / "mesh.ply");
+  if (!paths.estimate) return;
+  if (!source.surface)
+    throw_invalid("--estimate " + *paths.estimate, "no true surface to measure it by",
+                  "a truth with mesh.ply");
+  source.estimate = read_ply(*paths.estimate);
+  source.estimate_name = fs::path(*paths.estimate).filename().string();
+}
+
 void read_held_out(const Session& session, EvalSource& source) {
   for (const fs::path& folder :
        {source.truth.value_or(""), source.input ? fs::path(source.input->dataset.path) : fs::path()}) {
@@ -106,8 +117,7 @@ EvalSource read_eval_source(const EvalPaths& paths, const Session& session) {
   source.box = box_of(source.run);
   read_dataset_of_run(paths, session, source);
   source.truth = truth_folder(paths, source);
-  if (source.truth && fs::is_regular_file(*source.truth / "mesh.ply"))
-    source.surface = read_ply(*source.truth / "mesh.ply");
+  read_surfaces(paths, source);
   read_held_out(session, source);
   session.context().throw_if_cancelled();
   return source;

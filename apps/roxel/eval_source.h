@@ -13,8 +13,9 @@ namespace roxel::cli {
 
 struct EvalPaths {
   std::string run;
-  std::optional<std::string> truth;    ///< folder; none: the data set, where that has truth
-  std::optional<std::string> dataset;  ///< none: as the run names it
+  std::optional<std::string> truth;     ///< folder; none: the data set, where that has truth
+  std::optional<std::string> dataset;   ///< none: as the run names it
+  std::optional<std::string> estimate;  ///< PLY file of another surface to measure
 };
 
 struct EvalSource {
@@ -24,7 +25,9 @@ struct EvalSource {
   std::optional<Input> input;                ///< the run's data set
   std::map<std::string, const View*> views;  ///< of it, by name
   std::optional<std::filesystem::path> truth;
-  std::optional<Mesh> surface;    ///< truth/mesh.ply
+  std::optional<Mesh> surface;   ///< truth/mesh.ply
+  std::optional<Mesh> estimate;  ///< to measure besides the run
+  std::string estimate_name;
   std::optional<Input> held_out;  ///< views of transforms_test.json
   std::vector<std::string> notes;
 

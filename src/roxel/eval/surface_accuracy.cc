@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "roxel/base/error.h"
@@ -32,12 +33,16 @@ bool is_seen(const TrueView& view, const Eigen::Vector3d& x) {
   if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.x() < width && uvz.y() >= 0 && uvz.y() < height)) return false;
   const int left = static_cast<int>(std::floor(uvz.x() - 0.5)),
             top = static_cast<int>(std::floor(uvz.y() - 0.5));
-  float farthest = 0;
+  float nearest = std::numeric_limits<float>::infinity(), farthest = 0;
   for (int dy = 0; dy < 2; ++dy)
-    for (int dx = 0; dx < 2; ++dx)
-      farthest = std::max(farthest, *view.depth.pixel(std::clamp(left + dx, 0, width - 1),
-                                                      std::clamp(top + dy, 0, height - 1)));
-  return uvz.z() * (1 - kDepthTolerance) <= farthest;
+    for (int dx = 0; dx < 2; ++dx) {
+      const float z =
+          *view.depth.pixel(std::clamp(left + dx, 0, width - 1), std::clamp(top + dy, 0, height - 1));
+      if (!(z > 0)) continue;
+      nearest = std::min(nearest, z);
+      farthest = std::max(farthest, z);
+    }
+  return uvz.z() >= nearest * (1 - kDepthTolerance) && uvz.z() <= farthest * (1 + kDepthTolerance);
 }
 
 void count_sightings(const TrueView& view, std::span<const Eigen::Vector3d> points, int threads,
@@ -63,10 +68,14 @@ SurfaceAccuracy surface_accuracy(std::vector<double> to_truth, std::vector<doubl
   SurfaceAccuracy accuracy;
   accuracy.estimate_points = static_cast<std::int64_t>(to_truth.size());
   accuracy.truth_points = static_cast<std::int64_t>(to_estimate.size());
-  for (const double distance : distances) {
+  const auto shares_within = [&](double distance) {
     const double precision = share_within(to_truth, distance), recall = share_within(to_estimate, distance);
-    accuracy.shares.push_back({distance, precision, recall, harmonic_mean(precision, recall)});
-  }
+    return DistanceShares{distance, precision, recall, harmonic_mean(precision, recall)};
+  };
+  for (const double distance : distances) accuracy.shares.push_back(shares_within(distance));
+  const double largest = distances.empty() ? 0.0 : *std::max_element(distances.begin(), distances.end());
+  for (int step = 0; step <= SurfaceAccuracy::kCurveSteps && largest > 0; ++step)
+    accuracy.curve.push_back(shares_within(largest * step / SurfaceAccuracy::kCurveSteps));
   accuracy.mean_to_truth = mean(to_truth);
   accuracy.mean_to_estimate = mean(to_estimate);
   accuracy.median_to_truth = quantile(to_truth, 0.5);

@@ -18,8 +18,8 @@ struct TrueView {
   Image depth;
 };
 
-/// Whether the point is the surface that the view shows: inside the image, and not behind the farthest of the
-/// four pixel centres around it by more than kDepthTolerance of its depth.
+/// Whether the point is the surface that the view shows: inside the image, and its depth between the nearest
+/// and the farthest of the four pixel centres around it, with kDepthTolerance of that to either side.
 bool is_seen(const TrueView& view, const Eigen::Vector3d& x);
 inline constexpr double kDepthTolerance = 0.003;  ///< half floats are good to 0.0005
 
@@ -44,6 +44,8 @@ struct SurfaceAccuracy {
   double mean_to_estimate = 0;  ///< of the truth's points; infinity without an estimate
   double median_to_estimate = 0;
   std::vector<DistanceShares> shares;
+  std::vector<DistanceShares> curve;  ///< for a plot: kCurveSteps steps up to the largest distance
+  static constexpr int kCurveSteps = 40;
 };
 
 /// From distances that are known: of the estimate's points to the truth, and of the truth's to the estimate.

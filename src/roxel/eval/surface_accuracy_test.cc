@@ -54,6 +54,9 @@ TEST(SurfaceAccuracy, ByHand) {
   EXPECT_DOUBLE_EQ(accuracy.shares[0].recall, 2 / 3.0);
   EXPECT_DOUBLE_EQ(accuracy.shares[0].f_score, 2 * 0.25 * (2 / 3.0) / (0.25 + 2 / 3.0));
   EXPECT_DOUBLE_EQ(accuracy.shares[1].precision, 0.5);
+  ASSERT_EQ(accuracy.curve.size(), SurfaceAccuracy::kCurveSteps + 1);
+  EXPECT_EQ(accuracy.curve.front().precision, 0);
+  EXPECT_EQ(accuracy.curve.back().f_score, accuracy.shares.back().f_score);
   EXPECT_EQ(accuracy.accuracy_90, 9);
   EXPECT_EQ(accuracy.median_to_truth, 2);
   EXPECT_DOUBLE_EQ(accuracy.mean_to_estimate, 7 / 3.0);
@@ -84,8 +87,9 @@ TEST(Visibility, OfWhatIsHiddenBehindOrOutside) {
   EXPECT_FALSE(is_seen(view, {1, 0, 5.03}));  // behind the wall
   EXPECT_FALSE(is_seen(view, {-1, 0, 5}));    // behind the near wall
   EXPECT_TRUE(is_seen(view, {-0.4, 0, 2}));
-  EXPECT_FALSE(is_seen(view, {4, 0, 5}));   // outside the image
-  EXPECT_FALSE(is_seen(view, {1, 0, -5}));  // behind the camera
+  EXPECT_FALSE(is_seen(view, {0.8, 0, 4}));  // before the wall
+  EXPECT_FALSE(is_seen(view, {4, 0, 5}));    // outside the image
+  EXPECT_FALSE(is_seen(view, {1, 0, -5}));   // behind the camera
   std::vector<int> counts;
   const std::vector<Vector3d> points{{1, 0, 5}, {-1, 0, 5}};
   count_sightings(view, points, 1, counts);

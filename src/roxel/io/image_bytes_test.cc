@@ -27,7 +27,8 @@ Image read_back(const std::string& bytes, const std::string& name) {
 TEST(ImageBytes, PngIsExactToAByte) {
   const Image image = ramp(3), back = read_back(png_bytes(image), "image_bytes.png");
   ASSERT_EQ(back.width(), 40);
-  for (std::size_t i = 0; i < image.data().size(); ++i) ASSERT_NEAR(back.data()[i], image.data()[i], 0.51 / 255);
+  for (std::size_t i = 0; i < image.data().size(); ++i)
+    ASSERT_NEAR(back.data()[i], image.data()[i], 0.51 / 255);
   EXPECT_EQ(read_back(png_bytes(ramp(1)), "image_bytes_grey.png").height(), 30);
 }
 

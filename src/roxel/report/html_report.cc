@@ -33,9 +33,11 @@ p { margin: .4rem 0; overflow-wrap: anywhere; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; margin: .5rem 0; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid #ddd; padding: .25rem .7rem .25rem 0; text-align: right; vertical-align: top; }
-th:first-child, td:first-child { text-align: left; }
-table.text td { text-align: left; overflow-wrap: anywhere; }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 1rem; }
+td { white-space: nowrap; }
+th:first-child, td:first-child { text-align: left; white-space: normal; min-width: 6rem; }
+table.text td { text-align: left; white-space: normal; overflow-wrap: anywhere; }
+table.text td:first-child { overflow-wrap: normal; }
+.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 24rem), 1fr)); gap: 1rem; }
 .plots svg, .sections svg { width: 100%; height: auto; display: block; }
 .sections { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 18rem), 1fr)); gap: 1rem; align-items: start; }
 .sections figure { margin: 0; border: 1px solid #ccc; padding: .3rem; }
@@ -105,11 +107,13 @@ std::string duration(double seconds) {
 
 /// Rows of cells; all text is escaped here. The first row is the head.
 std::string table(const std::vector<std::vector<std::string>>& rows, const char* kind = "") {
-  std::string out = std::string("<div class=\"scroll\"><table") + (*kind ? std::string(" class=\"") + kind + "\"" : "") + ">\n";
+  std::string out = std::string("<div class=\"scroll\"><table") +
+                    (*kind ? std::string(" class=\"") + kind + "\"" : "") + ">\n";
   for (std::size_t r = 0; r < rows.size(); ++r) {
     out += "<tr>";
     for (const std::string& cell : rows[r])
-      out += (r == 0 && !*kind ? "<th>" : "<td>") + escape_markup(cell) + (r == 0 && !*kind ? "</th>" : "</td>");
+      out +=
+          (r == 0 && !*kind ? "<th>" : "<td>") + escape_markup(cell) + (r == 0 && !*kind ? "</th>" : "</td>");
     out += "</tr>\n";
   }
   return out + "</table></div>\n";
@@ -150,10 +154,12 @@ class Page {
   }
 
   void open() {
-    out_ = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-           "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-           escape_markup(title()) + ": roxel report</title>\n<style>" + kStyle + "</style>\n</head>\n<body>\n<h1>" +
-           escape_markup(title()) + "</h1>\n<p>" + escape_markup(text_of(at(at(summary_, "dataset"), "path"))) + "</p>\n";
+    out_ =
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+        escape_markup(title()) + ": roxel report</title>\n<style>" + kStyle +
+        "</style>\n</head>\n<body>\n<h1>" + escape_markup(title()) + "</h1>\n<p>" +
+        escape_markup(text_of(at(at(summary_, "dataset"), "path"))) + "</p>\n";
   }
 
   void heading(const char* text) { out_ += std::string("<h2>") + text + "</h2>\n"; }
@@ -166,7 +172,8 @@ class Page {
     out_ += "<div class=\"figures\">\n";
     figure(text_of(at(at(summary_, "dataset"), "images")), "images");
     const ordered_json& levels = at(summary_, "levels");
-    if (levels.is_array() && !levels.empty()) figure(text_of(at(levels.back(), "voxels_in_box")), "voxels in the box");
+    if (levels.is_array() && !levels.empty())
+      figure(text_of(at(levels.back(), "voxels_in_box")), "voxels in the box");
     const ordered_json& rms = at(summary_, "reprojection_rms_percent");
     if (rms.is_number()) figure(format("%.2f %%", rms.get<double>()), "reprojection error (RMS)");
     if (at(summary_, "seconds").is_number()) figure(duration(number(summary_, "seconds")), "computing time");
@@ -178,7 +185,9 @@ class Page {
   void measured_figures(const RunMeasures& m) {
     if (!m.depth.empty()) {
       const DepthAccuracy all = total_depth(m.depth);
-      if (all.thresholds.size() > 1) figure(percent(all.share_within(1)), "of depths within " + short_number(all.thresholds[1]) + " voxel");
+      if (all.thresholds.size() > 1)
+        figure(percent(all.share_within(1)),
+               "of depths within " + short_number(all.thresholds[1]) + " voxel");
     }
     if (m.volume) {
       figure(percent(m.volume->share_close()), "of voxels within 4 of the truth");
@@ -232,24 +241,29 @@ class Page {
 
   void surface_table(const RunMeasures& m) {
     if (m.surfaces.empty()) return;
-    std::vector<std::vector<std::string>> rows{{"surface", "points", "accuracy at 90 %", "within", "precision", "recall", "F"}};
+    std::vector<std::vector<std::string>> rows{
+        {"surface", "points", "accuracy at 90 %", "within", "precision", "recall", "F"}};
     for (const auto& [name, a] : m.surfaces)
       for (const DistanceShares& s : a.shares) {
         const bool first = &s == &a.shares.front();
-        rows.push_back({first ? name : "", first ? grouped(a.estimate_points) : "", first ? short_number(a.accuracy_90) : "",
-                        short_number(s.distance), percent(s.precision), percent(s.recall), format("%.4f", s.f_score)});
+        rows.push_back({first ? name : "", first ? grouped(a.estimate_points) : "",
+                        first ? short_number(a.accuracy_90) : "", short_number(s.distance),
+                        percent(s.precision), percent(s.recall), format("%.4f", s.f_score)});
       }
     out_ += "<h3>Surfaces</h3>\n" + table(rows);
-    out_ += "<p>Distances in world units; the box's diagonal is " + short_number(m.box_diagonal()) + ", a voxel " +
-            short_number(m.voxel_size) + ". Two views see " + percent(m.surface_seen) + " of the true surface in the box.</p>\n";
+    out_ += "<p>Distances in world units; the box's diagonal is " + short_number(m.box_diagonal()) +
+            ", a voxel " + short_number(m.voxel_size) + ". Two views see " + percent(m.surface_seen) +
+            " of the true surface in the box.</p>\n";
   }
 
   void volume_table(const RunMeasures& m) {
     if (!m.volume) return;
-    out_ += "<h3>Voxels</h3>\n" +
-            table({{"opacity at least", "voxels", "within 4 voxels", "weighted mean opacity", "surface covered"},
-                   {short_number(m.opacity_threshold), grouped(m.volume->voxels), percent(m.volume->share_close(), 2),
-                    percent(m.volume->weighted_mean_opacity(), 2), percent(m.volume->share_covered(), 2)}});
+    out_ +=
+        "<h3>Voxels</h3>\n" +
+        table({{"opacity at least", "voxels", "within 4 voxels", "weighted mean opacity", "surface covered"},
+               {short_number(m.opacity_threshold), grouped(m.volume->voxels),
+                percent(m.volume->share_close(), 2), percent(m.volume->weighted_mean_opacity(), 2),
+                percent(m.volume->share_covered(), 2)}});
   }
 
   void depth_table(const RunMeasures& m) {
@@ -276,10 +290,11 @@ class Page {
   void quality_table(const char* title, const std::vector<NamedImageQuality>& list) {
     if (list.empty()) return;
     const NamedImageQuality total = total_quality(list);
-    std::vector<std::vector<std::string>> rows{{"all views, over", "RMS", "red", "green", "blue", "PSNR", "SSIM"}};
+    std::vector<std::vector<std::string>> rows{
+        {"all views, over", "RMS", "red", "green", "blue", "PSNR", "SSIM"}};
     for (const auto& [name, q] : {std::pair{"the object", total.object}, {"all pixels", total.all}})
-      rows.push_back({name, percent(q.rms(), 2), percent(q.rms(0), 2), percent(q.rms(1), 2), percent(q.rms(2), 2),
-                      format("%.2f dB", q.psnr()), format("%.4f", q.ssim())});
+      rows.push_back({name, percent(q.rms(), 2), percent(q.rms(0), 2), percent(q.rms(1), 2),
+                      percent(q.rms(2), 2), format("%.2f dB", q.psnr()), format("%.4f", q.ssim())});
     out_ += std::string("<h3>") + title + "</h3>\n" + table(rows);
   }
 
@@ -287,8 +302,9 @@ class Page {
     if (!m.color) return;
     out_ += "<h3>Colour against albedo</h3>\n" +
             table({{"pixels", "CIEDE2000 mean", "median", "relative error mean", "median"},
-                   {grouped(m.color->pixels), format("%.2f", m.color->mean_delta_e), format("%.2f", m.color->median_delta_e),
-                    percent(m.color->mean_relative), percent(m.color->median_relative)}});
+                   {grouped(m.color->pixels), format("%.2f", m.color->mean_delta_e),
+                    format("%.2f", m.color->median_delta_e), percent(m.color->mean_relative),
+                    percent(m.color->median_relative)}});
   }
 
   void views() {
@@ -297,14 +313,16 @@ class Page {
     const double all = number(at(summary_, "dataset"), "images");
     if (all > static_cast<double>(content_.views.size()))
       out_ += format("<p>%zu of %.0f views.</p>\n", content_.views.size(), all);
-    out_ += "<p>Depth: near is pale, far is blue. Error: black is none, white a quarter of full scale and more. "
-            "Sigma: black is sure, white four voxels and more.</p>\n";
+    out_ +=
+        "<p>Depth: near is pale, far is blue. Error: black is none, white a quarter of full scale and more. "
+        "Sigma: black is sure, white four voxels and more.</p>\n";
     for (const ReportView& view : content_.views) {
       out_ += "<div class=\"view\"><h3>" + escape_markup(view.name) + (view.figures.empty() ? "" : ": ") +
               escape_markup(view.figures) + "</h3><div class=\"row\">\n";
       for (const ReportPicture& picture : view.pictures)
-        out_ += "<figure><img src=\"" + picture.uri + "\" alt=\"" + escape_markup(picture.caption + " of " + view.name) +
-                "\"><figcaption>" + escape_markup(picture.caption) + "</figcaption></figure>\n";
+        out_ += "<figure><img src=\"" + picture.uri + "\" alt=\"" +
+                escape_markup(picture.caption + " of " + view.name) + "\"><figcaption>" +
+                escape_markup(picture.caption) + "</figcaption></figure>\n";
       out_ += "</div></div>\n";
     }
   }
@@ -337,7 +355,8 @@ class Page {
     int level = 0;
     const ordered_json &levels = at(summary_, "levels"), &stages = at(summary_, "stages");
     for (const auto& record : levels.is_array() ? levels : ordered_json::array())
-      row("level " + std::to_string(++level) + ", voxels of " + text_of(at(record, "voxel_size")), number(record, "seconds"));
+      row("level " + std::to_string(++level) + ", voxels of " + text_of(at(record, "voxel_size")),
+          number(record, "seconds"));
     for (const auto& stage : stages.is_array() ? stages : ordered_json::array())
       row(text_of(at(stage, "name")), number(stage, "seconds"));
     row("all", total);

@@ -22,18 +22,18 @@ struct ReportView {
 };
 
 struct ReportContent {
-  nlohmann::ordered_json summary;          ///< of the run, as docs/format.md has it
-  std::vector<ReportView> views = {};           ///< those that are shown
+  nlohmann::ordered_json summary;      ///< of the run, as docs/format.md has it
+  std::vector<ReportView> views = {};  ///< those that are shown
   std::vector<Section> sections = {};
-  std::vector<float> opacities = {};            ///< of the box's voxels
-  const RunMeasures* measures = nullptr;   ///< against the truth; null: not measured
+  std::vector<float> opacities = {};      ///< of the box's voxels
+  const RunMeasures* measures = nullptr;  ///< against the truth; null: not measured
 };
 
 /// Everything from outside is escaped; nothing is fetched from anywhere, and there are no scripts.
 std::string html_report(const ReportContent& content);
 
 /// Most views that a report shows; larger runs show every n-th.
-inline constexpr int kMostReportViews = 24;
+inline constexpr int kMostReportViews = 12;
 /// Which of `count` views are shown, ascending.
 std::vector<int> report_views(int count);
 

@@ -24,7 +24,12 @@ ReportContent some_content() {
                      {"levels", {{{"voxel_size", 0.25}, {"seconds", 3.0}, {"voxels_in_box", 1234567}}}},
                      {"stages", {{{"name", "survey"}, {"seconds", 1.0}}}},
                      {"seconds", 4.0},
-                     {"passes", {{{"level", 1}, {"mean_opacity_change", 0.1}, {"mean_log_likelihood", -3.0}, {"active_voxels", 9}, {"seconds", 3.0}}}}};
+                     {"passes",
+                      {{{"level", 1},
+                        {"mean_opacity_change", 0.1},
+                        {"mean_log_likelihood", -3.0},
+                        {"active_voxels", 9},
+                        {"seconds", 3.0}}}}};
   content.views = {{"a<b", "RMS 2 %", {report_picture("photograph", Image(40, 30, 3, 0.5f))}}};
   content.opacities = {0.1f, 0.9f};
   return content;
@@ -96,9 +101,9 @@ TEST(SectionPicture, OutlinesAreDrawnOnceAndInsideAlone) {
     section.outline.push_back({Eigen::Vector2d(x0, y0), Eigen::Vector2d(x1, y1)});
   };
   add(1, 2, 3, 4.02);
-  add(1, 2, 3, 4);      // the same to a tenth of a voxel
-  add(20, 2, 30, 4);    // outside
-  add(5, 5, 5.01, 5);   // no length
+  add(1, 2, 3, 4);     // the same to a tenth of a voxel
+  add(20, 2, 30, 4);   // outside
+  add(5, 5, 5.01, 5);  // no length
   const std::string svg = section_svg(section);
   EXPECT_THAT(svg, HasSubstr("d=\"M1 2L3 4\""));
   EXPECT_THAT(svg, HasSubstr("section z = 0.25"));

@@ -11,14 +11,16 @@ using nlohmann::ordered_json;
 
 NamedPlot surface_plot(const NamedSurfaceAccuracy& surface, std::size_t idx) {
   PlotSeries precision{"precision", {}, {}}, recall{"recall", {}, {}}, f_score{"F-score", {}, {}};
-  for (const DistanceShares& s : surface.accuracy.shares) {
+  for (const DistanceShares& s : surface.accuracy.curve) {
     for (PlotSeries* series : {&precision, &recall, &f_score}) series->x.push_back(s.distance);
     precision.y.push_back(s.precision);
     recall.y.push_back(s.recall);
     f_score.y.push_back(s.f_score);
   }
   return {"surface_" + std::to_string(idx + 1),
-          {"Within a distance: " + surface.name, {"distance [world units]", 0.0}, {"share", 0.0, 1.0},
+          {"Within a distance: " + surface.name,
+           {"distance [world units]", 0.0},
+           {"share", 0.0, 1.0},
            {precision, recall, f_score}}};
 }
 
@@ -29,7 +31,11 @@ NamedPlot distance_plot(const DistanceHistogram& histogram) {
     bars.x.push_back(bin * DistanceHistogram::kBinVoxels);
     bars.y.push_back(static_cast<double>(histogram.voxels[bin]));
   }
-  return {"voxel_distances", {"Voxels by distance from the truth", {"distance [voxels], last: 10 and more"}, {"voxels", 0.0}, {bars}}};
+  return {"voxel_distances",
+          {"Voxels by distance from the truth",
+           {"distance [voxels], last: 10 and more"},
+           {"voxels", 0.0},
+           {bars}}};
 }
 
 NamedPlot opacity_by_distance_plot(const DistanceHistogram& histogram) {
@@ -38,8 +44,11 @@ NamedPlot opacity_by_distance_plot(const DistanceHistogram& histogram) {
     bars.x.push_back(bin * DistanceHistogram::kBinVoxels);
     bars.y.push_back(histogram.mean_opacity(bin));
   }
-  return {"voxel_opacities", {"Mean opacity by distance from the truth", {"distance [voxels], last: 10 and more"},
-                              {"mean opacity", 0.0, 1.0}, {bars}}};
+  return {"voxel_opacities",
+          {"Mean opacity by distance from the truth",
+           {"distance [voxels], last: 10 and more"},
+           {"mean opacity", 0.0, 1.0},
+           {bars}}};
 }
 
 /// The density of |error| / sigma beside that of honest Gaussian errors.
@@ -51,39 +60,53 @@ NamedPlot normalized_error_plot(const DepthAccuracy& all) {
     std::int64_t count = 0;
     for (int i = 0; i < kGroup; ++i) count += all.normalized_errors[bar * kGroup + i];
     bars.x.push_back(bar * kWidth);
-    bars.y.push_back(static_cast<double>(count) / (kWidth * static_cast<double>(std::max<std::int64_t>(all.calibrated_pixels, 1))));
+    bars.y.push_back(static_cast<double>(count) /
+                     (kWidth * static_cast<double>(std::max<std::int64_t>(all.calibrated_pixels, 1))));
   }
   for (double k = 0; k <= kShown; k += 0.1) {
     honest.x.push_back(k);
     honest.y.push_back(std::sqrt(2 / M_PI) * std::exp(-0.5 * k * k));
   }
-  return {"depth_error_over_sigma", {"Depth error over its stated deviation", {"|error| / sigma", 0.0, kShown},
-                                     {"density", 0.0}, {bars, honest}}};
+  return {"depth_error_over_sigma",
+          {"Depth error over its stated deviation",
+           {"|error| / sigma", 0.0, kShown},
+           {"density", 0.0},
+           {bars, honest}}};
 }
 
 NamedPlot reliability_plot(const Reliability& curve) {
-  PlotSeries points{"measured", {}, {}, PlotStyle::kPoints}, honest{"honest", {0, 1}, {0, 1}, PlotStyle::kDashes};
+  PlotSeries points{"measured", {}, {}, PlotStyle::kPoints},
+      honest{"honest", {0, 1}, {0, 1}, PlotStyle::kDashes};
   for (int bin = 0; bin < Reliability::kBins; ++bin) {
     if (curve.pixels[bin] == 0) continue;
     points.x.push_back(curve.mean_opacity(bin));
     points.y.push_back(curve.surface_share(bin));
   }
-  return {"opacity_reliability", {"Are opacities honest?", {"opacity of the ray", 0.0, 1.0}, {"share with a true surface", 0.0, 1.0},
-                                  {points, honest}}};
+  return {"opacity_reliability",
+          {"Are opacities honest?",
+           {"opacity of the ray", 0.0, 1.0},
+           {"share with a true surface", 0.0, 1.0},
+           {points, honest}}};
 }
 
 /// A bar a view.
-NamedPlot quality_plot(const std::string& name, const std::string& title, const std::vector<NamedImageQuality>& views) {
+NamedPlot quality_plot(const std::string& name, const std::string& title,
+                       const std::vector<NamedImageQuality>& views) {
   PlotSeries bars{"", {}, {}, PlotStyle::kBars, 0.9};
   for (const NamedImageQuality& view : views) {
     bars.x.push_back(static_cast<double>(bars.x.size()) + 0.55);
     bars.y.push_back(100 * view.object.rms());
   }
-  return {name, {title, {"view", 0.5, static_cast<double>(views.size()) + 0.5}, {"RMS over the object [%]", 0.0}, {bars}}};
+  return {name,
+          {title,
+           {"view", 0.5, static_cast<double>(views.size()) + 0.5},
+           {"RMS over the object [%]", 0.0},
+           {bars}}};
 }
 
 /// A line over all passes of all levels, counted through.
-NamedPlot pass_plot(const ordered_json& passes, const char* name, const char* title, const char* key, PlotAxis y) {
+NamedPlot pass_plot(const ordered_json& passes, const char* name, const char* title, const char* key,
+                    PlotAxis y) {
   std::vector<PlotSeries> levels;
   int count = 0, level = 0;
   for (const auto& pass : passes) {
@@ -101,25 +124,31 @@ NamedPlot pass_plot(const ordered_json& passes, const char* name, const char* ti
 
 std::vector<NamedPlot> measure_plots(const RunMeasures& measures) {
   std::vector<NamedPlot> plots;
-  for (std::size_t i = 0; i < measures.surfaces.size(); ++i) plots.push_back(surface_plot(measures.surfaces[i], i));
+  for (std::size_t i = 0; i < measures.surfaces.size(); ++i)
+    plots.push_back(surface_plot(measures.surfaces[i], i));
   if (measures.volume) {
     plots.push_back(distance_plot(measures.volume->histogram));
     plots.push_back(opacity_by_distance_plot(measures.volume->histogram));
   }
   if (!measures.depth.empty()) plots.push_back(normalized_error_plot(total_depth(measures.depth)));
   if (measures.opacity_reliability) plots.push_back(reliability_plot(*measures.opacity_reliability));
-  if (!measures.images.empty()) plots.push_back(quality_plot("images", "Renders against photographs", measures.images));
-  if (!measures.held_out.empty()) plots.push_back(quality_plot("held_out", "Held-out views", measures.held_out));
+  if (!measures.images.empty())
+    plots.push_back(quality_plot("images", "Renders against photographs", measures.images));
+  if (!measures.held_out.empty())
+    plots.push_back(quality_plot("held_out", "Held-out views", measures.held_out));
   return plots;
 }
 
 std::vector<NamedPlot> convergence_plots(const ordered_json& summary) {
+  if (!summary.is_object()) return {};
   const ordered_json passes = summary.value("passes", ordered_json::array());
   if (passes.empty()) return {};
-  return {pass_plot(passes, "opacity_change", "Mean change of opacity", "mean_opacity_change", {"change a pass", {}, {}, true}),
-          pass_plot(passes, "log_likelihood", "Mean log-likelihood", "mean_log_likelihood", {"per observation"}),
-          pass_plot(passes, "active_voxels", "Voxels", "active_voxels", {"voxels", 0.0}),
-          pass_plot(passes, "pass_seconds", "Time of a pass", "seconds", {"seconds", 0.0})};
+  return {
+      pass_plot(passes, "opacity_change", "Mean change of opacity", "mean_opacity_change",
+                {"change a pass", {}, {}, true}),
+      pass_plot(passes, "log_likelihood", "Mean log-likelihood", "mean_log_likelihood", {"per observation"}),
+      pass_plot(passes, "active_voxels", "Voxels", "active_voxels", {"voxels", 0.0}),
+      pass_plot(passes, "pass_seconds", "Time of a pass", "seconds", {"seconds", 0.0})};
 }
 
 NamedPlot opacity_plot(const std::vector<float>& opacities) {

@@ -55,7 +55,8 @@ TEST(RunMeasures, WhatWasNotMeasuredIsNull) {
   const RunMeasures none;
   EXPECT_TRUE(none.empty());
   const auto json = to_json(none);
-  for (const char* key : {"depth", "calibration", "volume", "images", "held_out", "color"}) EXPECT_TRUE(json[key].is_null()) << key;
+  for (const char* key : {"depth", "calibration", "volume", "images", "held_out", "color"})
+    EXPECT_TRUE(json[key].is_null()) << key;
   EXPECT_TRUE(csv_tables(none).empty());
   EXPECT_EQ(to_text(none), "");
   EXPECT_TRUE(measure_plots(none).empty());
@@ -102,8 +103,8 @@ TEST(MeasurePlots, OneForEachPart) {
     names.push_back(plot.name);
     EXPECT_THAT(svg_plot(plot.plot), Not(HasSubstr("nan")));
   }
-  EXPECT_THAT(names, testing::ElementsAre("surface_1", "voxel_distances", "voxel_opacities", "depth_error_over_sigma",
-                                          "opacity_reliability", "images"));
+  EXPECT_THAT(names, testing::ElementsAre("surface_1", "voxel_distances", "voxel_opacities",
+                                          "depth_error_over_sigma", "opacity_reliability", "images"));
 }
 
 TEST(MeasurePlots, HonestErrorsFillTheirCurve) {

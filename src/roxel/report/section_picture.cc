@@ -45,12 +45,14 @@ std::string section_name(const Section& section) {
 std::string section_svg(const Section& section) {
   const int width = section.opacity.width(), height = section.opacity.height();
   const std::string size = std::to_string(width) + " " + std::to_string(height);
-  std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + size + "\" role=\"img\"><title>section " +
-                    section_name(section) + "</title>\n<image width=\"" + std::to_string(width) + "\" height=\"" +
-                    std::to_string(height) + "\" style=\"image-rendering:pixelated\" href=\"" +
+  std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + size +
+                    "\" role=\"img\"><title>section " + section_name(section) + "</title>\n<image width=\"" +
+                    std::to_string(width) + "\" height=\"" + std::to_string(height) +
+                    "\" style=\"image-rendering:pixelated\" href=\"" +
                     data_uri("image/png", png_bytes(printed(section.opacity))) + "\"/>\n";
   if (const std::string path = outline_path(section); !path.empty())
-    svg += "<path d=\"" + path + "\" fill=\"none\" stroke=\"#e00000\" stroke-width=\"" + short_number(width / 400.0) + "\"/>\n";
+    svg += "<path d=\"" + path + "\" fill=\"none\" stroke=\"#e00000\" stroke-width=\"" +
+           short_number(width / 400.0) + "\"/>\n";
   return svg + "</svg>\n";
 }
 

@@ -16,7 +16,8 @@ constexpr double kWidth = 480, kHeight = 320;
 constexpr double kLeft = 64, kRight = 14, kTop = 34, kBottom = 50;
 constexpr int kMostTicks = 6;
 /// Told apart by people who do not see all colours, and by their greys.
-constexpr std::array<const char*, 6> kColors{"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#000000"};
+constexpr std::array<const char*, 6> kColors{"#0072b2", "#d55e00", "#009e73",
+                                             "#cc79a7", "#56b4e9", "#000000"};
 constexpr std::array<const char*, 6> kDashes{"", "7 4", "2 3", "9 3 2 3", "4 4", "1 4"};
 
 __attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ...) {
@@ -44,14 +45,16 @@ class Scale {
   bool shows(double value) const { return std::isfinite(value) && (!logarithmic_ || value > 0); }
 
   double at(double value) const {
-    const double share = logarithmic_ ? std::log(value / low_) / std::log(high_ / low_) : (value - low_) / (high_ - low_);
+    const double share =
+        logarithmic_ ? std::log(value / low_) / std::log(high_ / low_) : (value - low_) / (high_ - low_);
     return from_ + std::clamp(share, 0.0, 1.0) * (to_ - from_);
   }
 
   std::vector<double> ticks() const {
     if (!logarithmic_) return axis_ticks(low_, high_, kMostTicks);
     std::vector<double> decades;
-    for (double p = std::ceil(std::log10(low_) - 1e-9); p <= std::log10(high_) + 1e-9; ++p) decades.push_back(std::pow(10, p));
+    for (double p = std::ceil(std::log10(low_) - 1e-9); p <= std::log10(high_) + 1e-9; ++p)
+      decades.push_back(std::pow(10, p));
     return decades.size() >= 2 ? decades : std::vector<double>{low_, high_};
   }
 
@@ -71,7 +74,8 @@ struct Range {
 /// Ends that leave data a little room; bars stand on 0.
 Range padded(Range range, const PlotAxis& axis, bool bars) {
   if (!(range.low <= range.high)) return axis.logarithmic ? Range{0.1, 1} : Range{0, 1};
-  if (axis.logarithmic) return {std::pow(10, std::floor(std::log10(range.low))), std::pow(10, std::ceil(std::log10(range.high)))};
+  if (axis.logarithmic)
+    return {std::pow(10, std::floor(std::log10(range.low))), std::pow(10, std::ceil(std::log10(range.high)))};
   if (bars) range.low = std::min(range.low, 0.0);
   const double room = 0.04 * (range.high - range.low);
   if (range.low != 0) range.low -= room;
@@ -88,9 +92,11 @@ class Drawing {
         y_(plot.y, ranges_[1].low, ranges_[1].high, kHeight - kBottom, kTop + legend_height()) {}
 
   std::string svg() {
-    out_ = format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %g %g\" role=\"img\" font-family=\"sans-serif\" "
-                  "font-size=\"13\"><title>%s</title>\n<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
-                  kWidth, kHeight, escape_markup(plot_.title).substr(0, 200).c_str());
+    out_ = format(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %g %g\" role=\"img\" "
+        "font-family=\"sans-serif\" "
+        "font-size=\"13\"><title>%s</title>\n<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
+        kWidth, kHeight, escape_markup(plot_.title).substr(0, 200).c_str());
     draw_axes();
     for (std::size_t i = 0; i < plot_.series.size(); ++i) draw(plot_.series[i], i);
     draw_texts();
@@ -107,7 +113,8 @@ class Drawing {
       bars = bars || is_bars;
       for (std::size_t i = 0; i < series.x.size(); ++i) {
         const bool shown = std::isfinite(series.x[i]) && std::isfinite(series.y[i]) &&
-                           !(plot.x.logarithmic && series.x[i] <= 0) && !(plot.y.logarithmic && series.y[i] <= 0);
+                           !(plot.x.logarithmic && series.x[i] <= 0) &&
+                           !(plot.y.logarithmic && series.y[i] <= 0);
         if (!shown) continue;
         x.take(series.x[i]);
         if (is_bars) x.take(series.x[i] + series.bar_width);
@@ -119,7 +126,8 @@ class Drawing {
   }
 
   bool has_legend() const {
-    return std::any_of(plot_.series.begin(), plot_.series.end(), [](const PlotSeries& s) { return !s.name.empty(); });
+    return std::any_of(plot_.series.begin(), plot_.series.end(),
+                       [](const PlotSeries& s) { return !s.name.empty(); });
   }
   double legend_height() const { return has_legend() ? 20 : 0; }
 
@@ -134,15 +142,20 @@ class Drawing {
     const double bottom = kHeight - kBottom, top = kTop + legend_height();
     for (const double tick : x_.ticks()) {
       const double at = x_.at(tick);
-      out_ += format("<path d=\"M%.1f %.1fV%.1f\" stroke=\"#ddd\"/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%s</text>\n",
-                     at, bottom, top, at, bottom + 17, tick_text(tick).c_str());
+      out_ += format(
+          "<path d=\"M%.1f %.1fV%.1f\" stroke=\"#ddd\"/><text x=\"%.1f\" y=\"%.1f\" "
+          "text-anchor=\"middle\">%s</text>\n",
+          at, bottom, top, at, bottom + 17, tick_text(tick).c_str());
     }
     for (const double tick : y_.ticks()) {
       const double at = y_.at(tick);
-      out_ += format("<path d=\"M%.1f %.1fH%.1f\" stroke=\"#ddd\"/><text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">%s</text>\n",
-                     kLeft, at, kWidth - kRight, kLeft - 6, at + 4.5, tick_text(tick).c_str());
+      out_ += format(
+          "<path d=\"M%.1f %.1fH%.1f\" stroke=\"#ddd\"/><text x=\"%.1f\" y=\"%.1f\" "
+          "text-anchor=\"end\">%s</text>\n",
+          kLeft, at, kWidth - kRight, kLeft - 6, at + 4.5, tick_text(tick).c_str());
     }
-    out_ += format("<path d=\"M%.1f %.1fV%.1fH%.1f\" fill=\"none\" stroke=\"#333\"/>\n", kLeft, top, bottom, kWidth - kRight);
+    out_ += format("<path d=\"M%.1f %.1fV%.1fH%.1f\" fill=\"none\" stroke=\"#333\"/>\n", kLeft, top, bottom,
+                   kWidth - kRight);
   }
 
   void draw(const PlotSeries& series, std::size_t idx) {
@@ -161,15 +174,20 @@ class Drawing {
     return series.style == PlotStyle::kDashes ? "5 4" : kDashes[idx % kDashes.size()];
   }
 
-  bool shows(const PlotSeries& series, std::size_t i) const { return x_.shows(series.x[i]) && y_.shows(series.y[i]); }
+  bool shows(const PlotSeries& series, std::size_t i) const {
+    return x_.shows(series.x[i]) && y_.shows(series.y[i]);
+  }
 
   void draw_bars(const PlotSeries& series, std::size_t idx) {
     const double ground = y_.at(plot_.y.logarithmic ? y_.low() : std::clamp(0.0, y_.low(), y_.high()));
     for (std::size_t i = 0; i < series.x.size(); ++i) {
       if (!shows(series, i)) continue;
-      const double left = x_.at(series.x[i]), right = x_.at(series.x[i] + series.bar_width), end = y_.at(series.y[i]);
-      out_ += format("<rect x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" fill=\"%s\" stroke=\"#fff\" stroke-width=\"0.5\"/>",
-                     left, std::min(end, ground), right - left, std::abs(ground - end), color(idx));
+      const double left = x_.at(series.x[i]), right = x_.at(series.x[i] + series.bar_width),
+                   end = y_.at(series.y[i]);
+      out_ += format(
+          "<rect x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" fill=\"%s\" stroke=\"#fff\" "
+          "stroke-width=\"0.5\"/>",
+          left, std::min(end, ground), right - left, std::abs(ground - end), color(idx));
     }
     out_ += "\n";
   }
@@ -181,7 +199,8 @@ class Drawing {
   }
 
   void draw_point(const PlotSeries& series, std::size_t i, std::size_t idx) {
-    out_ += format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"/>", x_.at(series.x[i]), y_.at(series.y[i]), color(idx));
+    out_ += format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"/>", x_.at(series.x[i]),
+                   y_.at(series.y[i]), color(idx));
   }
 
   void draw_line(const PlotSeries& series, std::size_t idx) {
@@ -196,23 +215,30 @@ class Drawing {
     }
     if (path.empty()) return;
     out_ += "<path d=\"" + path +
-            format("\" fill=\"none\" stroke=\"%s\" stroke-width=\"2\" stroke-dasharray=\"%s\"/>\n", color(idx), dashes(series, idx));
+            format("\" fill=\"none\" stroke=\"%s\" stroke-width=\"2\" stroke-dasharray=\"%s\"/>\n",
+                   color(idx), dashes(series, idx));
   }
 
   void draw_texts() {
-    out_ += format("<text x=\"%.1f\" y=\"20\" font-size=\"15\" font-weight=\"bold\">", 12.0) + escape_markup(plot_.title) + "</text>\n";
-    out_ += format("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">", (kLeft + kWidth - kRight) / 2, kHeight - 10) +
+    out_ += format("<text x=\"%.1f\" y=\"20\" font-size=\"15\" font-weight=\"bold\">", 12.0) +
+            escape_markup(plot_.title) + "</text>\n";
+    out_ += format("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">", (kLeft + kWidth - kRight) / 2,
+                   kHeight - 10) +
             escape_markup(plot_.x.label) + "</text>\n";
-    out_ += format("<text transform=\"translate(14 %.1f) rotate(-90)\" text-anchor=\"middle\">", (kTop + kHeight - kBottom) / 2) +
+    out_ += format("<text transform=\"translate(14 %.1f) rotate(-90)\" text-anchor=\"middle\">",
+                   (kTop + kHeight - kBottom) / 2) +
             escape_markup(plot_.y.label) + "</text>\n";
     double left = kLeft;
     for (std::size_t i = 0; i < plot_.series.size(); ++i) {
       const PlotSeries& series = plot_.series[i];
       if (series.name.empty()) continue;
-      if (series.style == PlotStyle::kBars || series.style == PlotStyle::kPoints)
+      if (series.style == PlotStyle::kPoints)
+        out_ += format("<circle cx=\"%.1f\" cy=\"40\" r=\"3\" fill=\"%s\"/>", left + 12, color(i));
+      else if (series.style == PlotStyle::kBars)
         out_ += format("<rect x=\"%.1f\" y=\"36\" width=\"16\" height=\"8\" fill=\"%s\"/>", left, color(i));
       else
-        out_ += format("<path d=\"M%.1f 40h24\" stroke=\"%s\" stroke-width=\"2\" stroke-dasharray=\"%s\"/>", left, color(i), dashes(series, i));
+        out_ += format("<path d=\"M%.1f 40h24\" stroke=\"%s\" stroke-width=\"2\" stroke-dasharray=\"%s\"/>",
+                       left, color(i), dashes(series, i));
       out_ += format("<text x=\"%.1f\" y=\"44\">", left + 28) + escape_markup(series.name) + "</text>\n";
       left += 42 + 7.0 * static_cast<double>(series.name.size());
     }
@@ -235,7 +261,8 @@ std::vector<double> axis_ticks(double low, double high, int most) {
       break;
     }
   std::vector<double> ticks;
-  for (double i = std::ceil(low / step - 1e-9); i <= high / step + 1e-9; ++i) ticks.push_back(i == 0 ? 0.0 : i * step);
+  for (double i = std::ceil(low / step - 1e-9); i <= high / step + 1e-9; ++i)
+    ticks.push_back(i == 0 ? 0.0 : i * step);
   return ticks;
 }
 

@@ -8,10 +8,10 @@
 namespace roxel {
 
 struct PlotAxis {
-  std::string label;           ///< with its unit: "distance [voxels]"
-  std::optional<double> low = {};   ///< ends of the axis; none: from the data
+  std::string label;               ///< with its unit: "distance [voxels]"
+  std::optional<double> low = {};  ///< ends of the axis; none: from the data
   std::optional<double> high = {};
-  bool logarithmic = false;    ///< values that are not above 0 are left out
+  bool logarithmic = false;  ///< values that are not above 0 are left out
 };
 
 enum class PlotStyle { kLine, kDashes, kPoints, kBars };

@@ -32,12 +32,16 @@ TEST(Markup, Numbers) {
   EXPECT_EQ(short_number(0.25), "0.25");
   EXPECT_EQ(short_number(1234.5678), "1235");
   EXPECT_EQ(grouped(12), "12");
-  EXPECT_EQ(grouped(1234567), "1\xE2\x80\x89" "234\xE2\x80\x89" "567");
+  EXPECT_EQ(grouped(1234567),
+            "1\xE2\x80\x89"
+            "234\xE2\x80\x89"
+            "567");
   EXPECT_EQ(grouped(-123), "-123");
 }
 
 TEST(SvgPlot, TicksAreRound) {
-  EXPECT_THAT(axis_ticks(0, 1, 6), testing::Pointwise(testing::DoubleNear(1e-12), {0.0, 0.2, 0.4, 0.6, 0.8, 1.0}));
+  EXPECT_THAT(axis_ticks(0, 1, 6),
+              testing::Pointwise(testing::DoubleNear(1e-12), {0.0, 0.2, 0.4, 0.6, 0.8, 1.0}));
   EXPECT_THAT(axis_ticks(-3, 14, 6), testing::ElementsAre(0, 5, 10));
   EXPECT_THAT(axis_ticks(1000, 1004, 6), testing::ElementsAre(1000, 1001, 1002, 1003, 1004));
 }
