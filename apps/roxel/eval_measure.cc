@@ -266,8 +266,14 @@ class Measurement {
       for (double& d : distances) d /= out_.voxel_size;
       return distances;
     };
-    const SurfaceDistance to_voxels(Mesh{saved_.centres, {}});
-    out_.volume = volume_accuracy(saved_.opacity, in_voxels(truth_distance_->of(saved_.centres, threads_)),
+    const SurfaceDistance to_voxels(Mesh{saved_.centres, {}});  // those just outside the box cover, too
+    SavedVoxels inside;
+    for (std::size_t i = 0; i < saved_.centres.size(); ++i) {
+      if (!source_.box.contains(saved_.centres[i])) continue;
+      inside.centres.push_back(saved_.centres[i]);
+      inside.opacity.push_back(saved_.opacity[i]);
+    }
+    out_.volume = volume_accuracy(inside.opacity, in_voxels(truth_distance_->of(inside.centres, threads_)),
                                   in_voxels(to_voxels.of(seen_, threads_)));
   }
 

@@ -244,7 +244,7 @@ class Report(EvalCase):
 
     def test_the_page_fits_a_phone_and_a_desk(self):
         for name, page in self.pages().items():
-            for width, columns in ((360, 2), (1200, 5)):
+            for width, columns in ((360, 6), (1200, 5)):
                 with self.subTest(f"{name} at {width}"):
                     found = self.probe(page, width)
                     self.assertEqual(found["width"], width)

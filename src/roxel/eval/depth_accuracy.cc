@@ -136,7 +136,7 @@ DepthAccuracy depth_accuracy(const EstimatedDepth& estimate, std::span<const flo
   return sums;
 }
 
-std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views) {
+std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views, std::size_t most_views) {
   if (views.empty()) return "";
   char cell[64];
   std::string head = "| view | pixels", rule = "|---|---:";
@@ -155,7 +155,7 @@ std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views) {
                     "|---:|---:|---:|---:|---:|---:|\n";
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i > 0) all.add(views[i].accuracy);
-    out += row(views[i].name, views[i].accuracy);
+    if (views.size() <= most_views) out += row(views[i].name, views[i].accuracy);
   }
   return out + row("**all**", all);
 }

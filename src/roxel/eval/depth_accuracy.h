@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -77,7 +78,9 @@ struct NamedDepthAccuracy {
   DepthAccuracy accuracy;
 };
 
-/// A Markdown table, in percent: a row a view, and a last row "all" with the sums.
-std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views);
+/// A Markdown table, in percent: a row a view where those are at most `most_views`, and a last row "all" with
+/// the sums.
+std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views,
+                                 std::size_t most_views = std::numeric_limits<std::size_t>::max());
 
 }  // namespace roxel

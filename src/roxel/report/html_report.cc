@@ -52,7 +52,9 @@ figcaption { font-size: .85rem; color: #444; }
 footer { margin-top: 2rem; font-size: .85rem; color: #555; border-top: 1px solid #ccc; padding-top: .4rem; }
 @media (max-width: 40rem) {
   body { padding: .6rem; }
-  .view .row { grid-template-columns: repeat(2, minmax(0, 1fr)); }
+  .view .row { grid-template-columns: repeat(6, minmax(0, 1fr)); }
+  .view figure { grid-column: span 2; }
+  .view figure:nth-child(-n+2) { grid-column: span 3; }
   table { font-size: .85rem; }
 }
 @media print {

@@ -355,13 +355,7 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& m
 
 std::string to_text(const RunMeasures& measures, std::size_t most_views) {
   std::string text;
-  if (!measures.depth.empty()) {
-    const bool few = measures.depth.size() <= most_views;
-    text += depth_accuracy_table(
-                few ? measures.depth
-                    : std::vector<NamedDepthAccuracy>{{"all views", total_depth(measures.depth)}}) +
-            "\n";
-  }
+  if (!measures.depth.empty()) text += depth_accuracy_table(measures.depth, most_views) + "\n";
   text += surfaces_text(measures) + volume_text(measures) + quality_text("images", measures.images) +
           quality_text("held-out images", measures.held_out) + calibration_text(measures) +
           color_text(measures.color);
