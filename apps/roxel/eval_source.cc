@@ -45,7 +45,14 @@ void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSou
                            " is not there: cameras and photographs are not known (--dataset)");
     return;
   }
-  source.input = read_input(path, input_options(source.run), session);
+  try {
+    source.input = read_input(path, input_options(source.run), session);
+  } catch (const InvalidInput& error) {
+    if (paths.dataset) throw;
+    source.notes.push_back(std::string("the run's data set cannot be read as it was: ") + error.what() +
+                           " (--dataset)");
+    return;
+  }
   for (const View& view : source.input->dataset.views) source.views[view.name] = &view;
 }
 

@@ -84,6 +84,12 @@ class Measures(EvalCase):
         self.assertEqual([w["f_score"] for w in estimate["within"]], [1, 1])
         self.assertIsNone(found["depth"])
 
+    def test_voxels_that_were_written_are_the_voxels_that_are_measured(self):
+        *_, voxels, estimate = self.measures("--truth", self.mesh, "--estimate", self.run_folder / "voxels.ply")["surfaces"]
+        self.assertEqual(estimate["points"], voxels["points"])
+        self.assertAlmostEqual(estimate["mean_to_truth"], voxels["mean_to_truth"], places=5)  # floats in the file
+        self.assertAlmostEqual(estimate["accuracy_90"], voxels["accuracy_90"], places=5)
+
     def test_truth_displaced_is_off_by_as_much(self):
         moved = self.folder / "moved.ply"
         top = [(x, y, 1.3) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
