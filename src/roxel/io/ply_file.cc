@@ -248,6 +248,7 @@ class MeshReader {
   Mesh read() {
     for (const Element& element : header_.elements) {
       check_size(element);
+      if (element.properties.empty()) continue;  // nothing of them is in the file
       for (std::int64_t i = 0; i < element.count; ++i) read_one(element);
     }
     if (mesh_.points.empty()) throw_invalid(path_.string(), "no vertices", "an element vertex with x, y, z");

@@ -84,6 +84,13 @@ TEST(PlyFile, WithoutFacesItIsAPointSet) {
   EXPECT_EQ(mesh.points.size(), 2);
 }
 
+TEST(PlyFile, ElementsWithoutPropertiesTakeNoTime) {
+  const Mesh mesh =
+      read_ply(written(std::string("ply\nformat ascii 1.0\nelement nothing 4000000000\nelement vertex 1\n") +
+                       kVertex + "end_header\n1 2 3\n"));
+  EXPECT_EQ(mesh.points.size(), 1);
+}
+
 TEST(PlyFile, ErrorsSayWhereAndWhat) {
   const std::string head = "ply\nformat ascii 1.0\nelement vertex 1\n";
   EXPECT_THAT(message_of(""), HasSubstr("ply_file_test.ply"));

@@ -111,11 +111,13 @@ TEST(MeasurePlots, HonestErrorsFillTheirCurve) {
   RunMeasures m;
   DepthAccuracy all;
   all.calibrated_pixels = 1000;
-  all.normalized_errors[0] = 1000;  // all below 1/25 sigma: one bar of 0.2 sigma holds the whole density
+  all.normalized_errors[0] = 500;  // half below 1/25 sigma, half near 0.3: bars of 0.2 sigma
+  all.normalized_errors[7] = 500;
   m.depth = {{"a", all}};
   const PlotSeries bars = measure_plots(m)[0].plot.series[0];
-  EXPECT_NEAR(bars.y[0], 5, 1e-12);
-  EXPECT_EQ(bars.y[1], 0);
+  EXPECT_NEAR(bars.y[0], 2.5, 1e-12);
+  EXPECT_NEAR(bars.y[1], 2.5, 1e-12);
+  EXPECT_EQ(bars.y[2], 0);
 }
 
 }  // namespace

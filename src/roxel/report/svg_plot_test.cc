@@ -64,6 +64,13 @@ TEST(SvgPlot, BarsStandOnZero) {
   EXPECT_THAT(svg, HasSubstr("<rect x=\"265.00\" y=\"34.00\" width=\"201.00\" height=\"236.00\""));
 }
 
+TEST(SvgPlot, BarsStandOnZeroWhereTheAxisIsFromTheData) {
+  // The taller one is as high as the field less 4 % of the axis; the other half as high.
+  const std::string svg = svg_plot({"Bars", {"x"}, {"y"}, {{"", {0, 1}, {4, 8}, PlotStyle::kBars, 1}}});
+  EXPECT_THAT(svg, HasSubstr("height=\"113.46\""));
+  EXPECT_THAT(svg, HasSubstr("height=\"226.92\""));
+}
+
 TEST(SvgPlot, LogarithmsAndGaps) {
   Plot plot{"Log", {"x", 0, 4}, {"y", 0.01, 100, true}, {{"", {0, 1, 2, 3, 4}, {1, 0, NAN, 1, 100}}}};
   const std::string svg = svg_plot(plot);
