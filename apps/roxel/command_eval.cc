@@ -205,7 +205,11 @@ int run_eval(const Invocation& invocation, const EvalOptions& options) {
   const RunMeasures measures = measure(source, wanted, session);
   check_measured(options, measures);
   const std::string json = json_text(to_json(measures));
-  if (folder) write_files(folder->path(), source, measures, json);
+  if (folder) {
+    PartialResults partial(folder->path());
+    write_files(partial.path(), source, measures, json);
+    partial.publish();
+  }
   session.display().clear();
   print_result(options.common, to_text(measures), json);
   return 0;

@@ -273,6 +273,8 @@ class Report(EvalCase):
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
+    if not CHROMIUM:
+        print("SKIPPED: no Chromium is installed, so nobody looks at the report's page", file=sys.stderr)
     cli_test.ROXEL = os.path.abspath(sys.argv.pop(1))
     cli_test.SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
     unittest.main(argv=[sys.argv[0], *sys.argv[1:]])

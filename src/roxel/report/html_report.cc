@@ -59,7 +59,9 @@ footer { margin-top: 2rem; font-size: .85rem; color: #555; border-top: 1px solid
 }
 @media print {
   @page { margin: 14mm; }
-  body { max-width: none; padding: 0; font-size: 10pt; }
+  html { font-size: 9pt; }
+  body { max-width: none; padding: 0; font-size: 1rem; }
+  .settings { columns: 3; }
   h2, h3 { break-after: avoid; }
   .plots { grid-template-columns: 1fr 1fr; }
   .sections { grid-template-columns: repeat(3, 1fr); }

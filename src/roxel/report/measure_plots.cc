@@ -18,7 +18,7 @@ NamedPlot surface_plot(const NamedSurfaceAccuracy& surface, std::size_t idx) {
     f_score.y.push_back(s.f_score);
   }
   return {"surface_" + std::to_string(idx + 1),
-          {"Within a distance: " + surface.name,
+          {"Surface: " + surface.name,
            {"distance [world units]", 0.0},
            {"share", 0.0, 1.0},
            {precision, recall, f_score}}};
