@@ -185,6 +185,16 @@ class BadTruth(EvalCase):
         self.expect_error(2, "missing.ply", "eval", self.run_folder, "--truth", self.mesh, "--estimate", bad / "missing.ply")
         self.expect_error(2, "nowhere", "eval", self.run_folder, "--dataset", self.folder / "nowhere")
 
+    def test_a_full_disc_leaves_older_measures(self):
+        out = self.folder / "older"
+        self.succeed("eval", self.run_folder, "-o", out, "--quiet")
+        before = cli_test.digests(out)
+        most_bytes = (out / "report.html").stat().st_size // 2
+        done = cli_test.run_on_a_full_disc("eval", self.run_folder, "--truth", self.mesh, "-o", out, most_bytes=most_bytes)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(cli_test.digests(out), before)
+        self.assertFalse((out / ".partial").exists())
+
     def test_truth_of_another_size_is_refused(self):
         small = self.folder / "small"
         self.synth(small, 4, "32x24")

@@ -86,6 +86,11 @@ std::string text_of(const ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_integer()) return grouped(value.get<std::int64_t>());
   if (value.is_number()) return short_number(value.get<double>(), 6);
+  if (value.is_array()) {
+    std::string list;
+    for (const auto& entry : value) list += (list.empty() ? "" : ", ") + text_of(entry);
+    return list;
+  }
   return value.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 

@@ -19,6 +19,7 @@ ReportContent some_content() {
   content.summary = {{"version", "1.2.3"},
                      {"command", "roxel reconstruct <evil> & co"},
                      {"dataset", {{"path", "/data/<b>\"bold\"</b>"}, {"images", 30}}},
+                     {"scene", {{"bounds", {-1.2000000476837158, 0, 0, 1, 2, 3}}}},
                      {"warnings", {"the box <cuts> what is seen"}},
                      {"options", {{"levels", 3}, {"init", nullptr}, {"noise", 0.5}}},
                      {"levels", {{{"voxel_size", 0.25}, {"seconds", 3.0}, {"voxels_in_box", 1234567}}}},
@@ -57,6 +58,7 @@ TEST(HtmlReport, FetchesNothing) {
 
 TEST(HtmlReport, SaysWhatTheSummarySays) {
   const std::string page = html_report(some_content());
+  EXPECT_THAT(page, HasSubstr("<td>-1.2, 0, 0, 1, 2, 3</td>"));
   EXPECT_THAT(page, HasSubstr("1 of 30 views"));
   EXPECT_THAT(page, HasSubstr("init = auto"));
   EXPECT_THAT(page, HasSubstr("noise = 0.5"));
