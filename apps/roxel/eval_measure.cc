@@ -42,7 +42,12 @@ void check_size(const fs::path& file, const Image& found, int width, int height,
                 std::to_string(width) + " x " + std::to_string(height) + " as " + who + " has");
 }
 
-Image read_plane(const fs::path& file) { return read_exr_channels(file.string()).front().plane; }
+/// The channel Z, as a run's own depth maps have it, else the first.
+Image read_true_depth(const fs::path& file) {
+  const std::vector<FloatChannel> channels = read_exr_channels(file.string());
+  const Image* depth = find_channel(channels, "Z");
+  return depth ? *depth : channels.front().plane;
+}
 
 /// True depth, 0 where the surface is outside the box: there is nothing there that the run could find.
 Image depth_in_box(const Image& depth, const PinholeCamera& camera, const Eigen::AlignedBox3d& box) {
@@ -130,7 +135,7 @@ class Measurement {
     if (fs::is_regular_file(estimate_file)) estimate = read_depth(estimate_file);
     Image truth;  // in the box; empty where there is none
     if (const auto file = source_.truth ? truth_file(*source_.truth, "depth", name) : std::nullopt) {
-      truth = read_plane(*file);
+      truth = read_true_depth(*file);
       if (estimate)
         check_size(*file, truth, estimate->depth.width(), estimate->depth.height(), estimate_file.string());
       if (view) {
