@@ -163,9 +163,13 @@ std::vector<ReportView> report_views_of(const EvalSource& source) {
         shown.pictures.push_back(report_picture(kind, read_image(file.string(), kAsItIs).rgb));
     if (const fs::path file = depth_path(source.run.path, name); fs::is_regular_file(file)) {
       const DepthLayers layers = read_depth(file);
+      const Image truth = true_depth_of(source, name);
       shown.pictures.push_back(
           report_picture("sigma of depth",
                          sigma_picture(layers.variance, layers.depth, layers.opacity, source.voxel_size())));
+      if (!truth.empty())
+        shown.pictures.push_back(report_picture(
+            "depth error", depth_error_picture(layers.depth, layers.opacity, truth, source.voxel_size())));
     }
     if (!shown.pictures.empty()) views.push_back(std::move(shown));
   }

@@ -378,6 +378,14 @@ std::vector<double> default_distances(double diagonal, double voxel_size) {
   return distances;
 }
 
+Image true_depth_of(const EvalSource& source, const std::string& view_name) {
+  const auto file = source.truth ? truth_file(*source.truth, "depth", view_name) : std::nullopt;
+  if (!file) return {};
+  Image depth = read_true_depth(*file);
+  const View* view = source.view(view_name);
+  return view ? depth_in_box(depth, view->camera, source.run.file.volume.index(0).frame().box()) : depth;
+}
+
 RunMeasures measure(const EvalSource& source, const MeasureOptions& options, Session& session) {
   return Measurement(source, options, session).take();
 }

@@ -19,6 +19,9 @@ struct MeasureOptions {
 /// 0.5 % and 1 % of the box's diagonal, and 1, 2 and 4 voxels; ascending.
 std::vector<double> default_distances(double diagonal, double voxel_size);
 
+/// True depth of a view, 0 where its surface lies outside the run's lattice; empty where it is not known.
+Image true_depth_of(const EvalSource& source, const std::string& view_name);
+
 /// Throws InvalidInput for truth that does not fit the run.
 RunMeasures measure(const EvalSource& source, const MeasureOptions& options, Session& session);
 

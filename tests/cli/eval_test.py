@@ -269,13 +269,14 @@ class Report(EvalCase):
 
     def test_the_page_fits_a_phone_and_a_desk(self):
         for name, page in self.pages().items():
-            for width, columns in ((360, 6), (1200, 5)):
+            for width, columns in ((360, 6), (1200, None)):
                 with self.subTest(f"{name} at {width}"):
                     found = self.probe(page, width)
                     self.assertEqual(found["width"], width)
                     self.assertLessEqual(found["needed"], width, "it scrolls sideways")
-                    self.assertEqual((found["images"], found["broken"]), (4 * 5, 0))
-                    self.assertEqual(found["columns"], columns)
+                    pictures = 6 if name == "eval" else 5  # and the error of depth
+                    self.assertEqual((found["images"], found["broken"]), (4 * pictures, 0))
+                    self.assertEqual(found["columns"], columns or pictures)
                     self.assertEqual(found["sections"], 3)
                     self.assertGreaterEqual(found["plots"], 5)
 

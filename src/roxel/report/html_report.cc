@@ -44,7 +44,7 @@ table.text td:first-child { overflow-wrap: normal; }
 .sections svg { max-height: 32rem; }
 figcaption { font-size: .85rem; color: #444; }
 .view { break-inside: avoid; margin: 0 0 1rem; }
-.view .row { display: grid; grid-template-columns: repeat(5, minmax(0, 1fr)); gap: .3rem; }
+.view .row { display: grid; grid-auto-flow: column; grid-auto-columns: minmax(0, 1fr); gap: .3rem; }
 .view figure { margin: 0; }
 .view img { width: 100%; height: auto; display: block; background: #ddd; }
 .settings { columns: 22rem; font-size: .85rem; font-family: ui-monospace, monospace; }
@@ -52,9 +52,9 @@ figcaption { font-size: .85rem; color: #444; }
 footer { margin-top: 2rem; font-size: .85rem; color: #555; border-top: 1px solid #ccc; padding-top: .4rem; }
 @media (max-width: 40rem) {
   body { padding: .6rem; }
-  .view .row { grid-template-columns: repeat(6, minmax(0, 1fr)); }
-  .view figure { grid-column: span 2; }
-  .view figure:nth-child(-n+2) { grid-column: span 3; }
+  .view .row { grid-auto-flow: row; grid-template-columns: repeat(6, minmax(0, 1fr)); }
+  .view figure { grid-column: span 3; }
+  .view .five figure:nth-child(n+3) { grid-column: span 2; }
   table { font-size: .85rem; }
 }
 @media print {
@@ -324,10 +324,15 @@ class Page {
       out_ += format("<p>%zu of %.0f views.</p>\n", content_.views.size(), all);
     out_ +=
         "<p>Depth: near is pale, far is blue. Error: black is none, white a quarter of full scale and more. "
-        "Sigma: black is sure, white four voxels and more.</p>\n";
+        "Sigma: black is sure, white four voxels and more.";
+    if (content_.measures && !content_.measures->depth.empty())
+      out_ +=
+          " Depth error: white is none, blue four voxels too near, red too far; black is missed or too much.";
+    out_ += "</p>\n";
     for (const ReportView& view : content_.views) {
       out_ += "<div class=\"view\"><h3>" + escape_markup(view.name) + (view.figures.empty() ? "" : ": ") +
-              escape_markup(view.figures) + "</h3><div class=\"row\">\n";
+              escape_markup(view.figures) + "</h3><div class=\"row" +
+              (view.pictures.size() == 5 ? " five" : "") + "\">\n";
       for (const ReportPicture& picture : view.pictures)
         out_ += "<figure><img src=\"" + picture.uri + "\" alt=\"" +
                 escape_markup(picture.caption + " of " + view.name) + "\"><figcaption>" +
