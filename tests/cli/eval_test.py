@@ -90,6 +90,15 @@ class Measures(EvalCase):
         self.assertAlmostEqual(estimate["mean_to_truth"], voxels["mean_to_truth"], places=5)  # floats in the file
         self.assertAlmostEqual(estimate["accuracy_90"], voxels["accuracy_90"], places=5)
 
+    def test_what_lies_outside_the_box_is_not_missed(self):
+        whole = self.measures()["depth"]
+        half = self.folder / "half"
+        self.succeed("reconstruct", self.data, "-o", half, *TINY, "--bounds=-1.5,-1.5,-1.2,0,1.5,1.8", "--quiet")
+        found = self.measures(run=half)["depth"]
+        self.assertLess(found["true_pixels"], 0.8 * whole["true_pixels"])
+        self.assertEqual(found["true_pixels"] + found["empty_pixels"], 4 * 64 * 48)
+        self.assertGreater(found["share_found"], 0.5)
+
     def test_another_run_may_be_the_truth(self):
         truth = self.folder / "same-run"
         shutil.copytree(self.run_folder, truth)
