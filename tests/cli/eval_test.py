@@ -93,7 +93,7 @@ class Measures(EvalCase):
     def test_what_lies_outside_the_box_is_not_missed(self):
         whole = self.measures()["depth"]
         half = self.folder / "half"
-        self.succeed("reconstruct", self.data, "-o", half, *TINY, "--bounds=-1.5,-1.5,-1.2,0,1.5,1.8", "--quiet")
+        self.succeed("reconstruct", self.data, "-o", half, *TINY, "--resolution", "64", "--bounds=-1.5,-1.5,-1.2,0,1.5,1.8", "--quiet")
         found = self.measures(run=half)["depth"]
         self.assertLess(found["true_pixels"], 0.8 * whole["true_pixels"])
         self.assertEqual(found["true_pixels"] + found["empty_pixels"], 4 * 64 * 48)
