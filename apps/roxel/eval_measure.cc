@@ -1,12 +1,12 @@
 #include "eval_measure.h"
 
-#include <atomic>
 #include <cmath>
 #include <limits>
 
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 #include "roxel/eval/depth_points.h"
+#include "roxel/eval/surface_sight.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
 #include "roxel/io/ply_file.h"
@@ -103,7 +103,6 @@ class Measurement {
     samples_ = source_.surface->is_point_set()
                    ? points_in_box(source_.surface->points, source_.box)
                    : sample_surface(*source_.surface, {options_.samples, options_.seed, source_.box});
-    sightings_.assign(samples_.size(), 0);
     out_.surface_samples = static_cast<std::int64_t>(samples_.size());
     if (samples_.empty())
       out_.notes.push_back("no surface of " + (*source_.truth / "mesh.ply").string() +
@@ -140,7 +139,6 @@ class Measurement {
         check_size(*file, truth, estimate->depth.width(), estimate->depth.height(), estimate_file.string());
       if (view) {
         check_size(*file, truth, view->camera.intrinsics.width, view->camera.intrinsics.height, view->source);
-        count_samples_seen(view->camera, truth);
         truth = depth_in_box(truth, view->camera, source_.run.file.volume.index(0).frame().box());
       }
     }
@@ -148,12 +146,6 @@ class Measurement {
     if (estimate && view) out.estimate = countable(*estimate, view->camera);
     if (view) out.quality = measure_render(*view, estimate ? &*estimate : nullptr, truth);
     return out;
-  }
-
-  void count_samples_seen(const PinholeCamera& camera, const Image& depth) {
-    const TrueView view{camera, depth};
-    for (std::size_t i = 0; i < samples_.size(); ++i)
-      if (is_seen(view, samples_[i])) std::atomic_ref(sightings_[i]).fetch_add(1, std::memory_order_relaxed);
   }
 
   void measure_depth(const std::string& name, const DepthLayers& estimate, const Image& truth,
@@ -213,16 +205,23 @@ class Measurement {
     return {name, image_quality(render, shown, object), image_quality(render, shown, photo.valid)};
   }
 
+  /// What two images see. A scan (points without triangles) holds nothing else, and hides nothing.
   void keep_seen_samples() {
-    for (std::size_t i = 0; i < samples_.size(); ++i)
-      if (sightings_[i] >= 2) seen_.push_back(samples_[i]);
-    const bool any = std::any_of(sightings_.begin(), sightings_.end(), [](int n) { return n > 0; });
-    if (!samples_.empty() && !any) {
-      out_.notes.push_back("no true depth with cameras: all of the true surface in the box counts as seen");
+    if (samples_.empty()) return;
+    std::vector<PinholeCamera> cameras;
+    for (const std::string& name : source_.view_names)
+      if (const View* view = source_.view(name)) cameras.push_back(view->camera);
+    if (cameras.empty() || source_.surface->is_point_set()) {
+      out_.notes.push_back("all of the true surface in the box counts, seen or not: " +
+                           std::string(cameras.empty() ? "cameras are not known" : "it is a set of points"));
       seen_ = samples_;
+    } else {
+      const std::vector<int> sightings = count_sightings(*source_.surface, samples_, cameras, threads_);
+      for (std::size_t i = 0; i < samples_.size(); ++i)
+        if (sightings[i] >= 2) seen_.push_back(samples_[i]);
+      if (seen_.empty()) out_.notes.push_back("no two images see any of the true surface in the box");
     }
-    if (!samples_.empty())
-      out_.surface_seen = static_cast<double>(seen_.size()) / static_cast<double>(samples_.size());
+    out_.surface_seen = static_cast<double>(seen_.size()) / static_cast<double>(samples_.size());
   }
 
   std::vector<double> distances() const {
@@ -362,7 +361,6 @@ class Measurement {
   int threads_;
   RunMeasures out_;
   std::vector<Eigen::Vector3d> samples_, seen_;  ///< of the true surface; those that two views see
-  std::vector<int> sightings_;
   std::vector<ViewDepth> estimates_;
   SavedVoxels saved_;
   std::optional<SurfaceDistance> truth_distance_;

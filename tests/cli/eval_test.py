@@ -84,6 +84,15 @@ class Measures(EvalCase):
         self.assertEqual([w["f_score"] for w in estimate["within"]], [1, 1])
         self.assertIsNone(found["depth"])
 
+    def test_a_scan_is_truth_as_it_is(self):
+        scan = self.folder / "scan"
+        scan.mkdir()
+        (scan / "mesh.ply").write_text(ply(CORNERS, []))
+        found = self.measures("--truth", scan, "--estimate", scan / "mesh.ply")
+        self.assertEqual(found["surface_samples"], len(CORNERS))
+        self.assertEqual(found["surfaces"][-1]["within"][0]["f_score"], 1)
+        self.assertIn("a set of points", found["notes"][0])
+
     def test_voxels_that_were_written_are_the_voxels_that_are_measured(self):
         *_, voxels, estimate = self.measures("--truth", self.mesh, "--estimate", self.run_folder / "voxels.ply")["surfaces"]
         self.assertEqual(estimate["points"], voxels["points"])
@@ -129,6 +138,7 @@ class Measures(EvalCase):
         self.assertEqual(found["depth"]["true_pixels"], here["depth"]["true_pixels"])
         self.assertIsNone(found["images"])
         self.assertIn("--dataset", found["notes"][0])
+        self.assertIn("cameras are not known", self.measures("--truth", self.mesh, run=run)["notes"][1])
         again = self.measures("--dataset", self.folder / "elsewhere", run=run)
         self.assertEqual(again["images"], here["images"])
 

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "roxel/base/error.h"
-#include "roxel/base/parallel.h"
 
 namespace roxel {
 namespace {
@@ -26,34 +24,6 @@ double share_within(const std::vector<double>& values, double limit) {
 double harmonic_mean(double a, double b) { return a + b > 0 ? 2 * a * b / (a + b) : 0.0; }
 
 }  // namespace
-
-bool is_seen(const TrueView& view, const Eigen::Vector3d& x) {
-  const Eigen::Vector3d uvz = view.camera.project(x);
-  const int width = view.depth.width(), height = view.depth.height();
-  if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.x() < width && uvz.y() >= 0 && uvz.y() < height)) return false;
-  const int left = static_cast<int>(std::floor(uvz.x() - 0.5)),
-            top = static_cast<int>(std::floor(uvz.y() - 0.5));
-  float nearest = std::numeric_limits<float>::infinity(), farthest = 0;
-  for (int dy = 0; dy < 2; ++dy)
-    for (int dx = 0; dx < 2; ++dx) {
-      const float z =
-          *view.depth.pixel(std::clamp(left + dx, 0, width - 1), std::clamp(top + dy, 0, height - 1));
-      if (!(z > 0)) continue;
-      nearest = std::min(nearest, z);
-      farthest = std::max(farthest, z);
-    }
-  return uvz.z() >= nearest * (1 - kDepthTolerance) && uvz.z() <= farthest * (1 + kDepthTolerance);
-}
-
-void count_sightings(const TrueView& view, std::span<const Eigen::Vector3d> points, int threads,
-                     std::vector<int>& counts) {
-  constexpr std::int64_t kGrain = 8192;
-  counts.resize(points.size(), 0);
-  parallel_for_blocks(static_cast<std::int64_t>(points.size()), kGrain, threads,
-                      [&](std::int64_t begin, std::int64_t end, int) {
-                        for (std::int64_t i = begin; i < end; ++i) counts[i] += is_seen(view, points[i]);
-                      });
-}
 
 double quantile(std::vector<double>& values, double q) {
   if (values.empty()) return 0;

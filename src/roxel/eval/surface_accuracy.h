@@ -6,26 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "roxel/camera/camera.h"
 #include "roxel/eval/surface_distance.h"
-#include "roxel/image/image.h"
 
 namespace roxel {
-
-/// A camera and what it truly sees: depth along the optical axis, 1 channel, 0 = no surface.
-struct TrueView {
-  PinholeCamera camera;
-  Image depth;
-};
-
-/// Whether the point is the surface that the view shows: inside the image, and its depth between the nearest
-/// and the farthest of the four pixel centres around it, with kDepthTolerance of that to either side.
-bool is_seen(const TrueView& view, const Eigen::Vector3d& x);
-inline constexpr double kDepthTolerance = 0.003;  ///< half floats are good to 0.0005
-
-/// Counts of views that see each point. Views may be given a few at a time.
-void count_sightings(const TrueView& view, std::span<const Eigen::Vector3d> points, int threads,
-                     std::vector<int>& counts);
 
 /// At one distance.
 struct DistanceShares {

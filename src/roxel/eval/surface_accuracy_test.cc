@@ -69,36 +69,15 @@ TEST(SurfaceAccuracy, OfNothingIsZero) {
   EXPECT_EQ(accuracy.shares[0].f_score, 0);
 }
 
-/// 10 x 10 pixels, looking along +z from the origin, and a wall at depth 5 whose left half is hidden by one
-/// at 2.
-TrueView two_walls() {
-  TrueView view;
-  view.camera.intrinsics = {10, 10, 10, 10, 5, 5, 0};
-  view.depth = Image(10, 10, 1, 5.0f);
-  for (int y = 0; y < 10; ++y)
-    for (int x = 0; x < 5; ++x) *view.depth.pixel(x, y) = 2;
-  return view;
-}
-
-TEST(Visibility, OfWhatIsHiddenBehindOrOutside) {
-  const TrueView view = two_walls();
-  EXPECT_TRUE(is_seen(view, {1, 0, 5}));
-  EXPECT_TRUE(is_seen(view, {1, 0, 5.01}));   // within the tolerance
-  EXPECT_FALSE(is_seen(view, {1, 0, 5.03}));  // behind the wall
-  EXPECT_FALSE(is_seen(view, {-1, 0, 5}));    // behind the near wall
-  EXPECT_TRUE(is_seen(view, {-0.4, 0, 2}));
-  EXPECT_FALSE(is_seen(view, {0.8, 0, 4}));  // before the wall
-  EXPECT_FALSE(is_seen(view, {4, 0, 5}));    // outside the image
-  EXPECT_FALSE(is_seen(view, {1, 0, -5}));   // behind the camera
-  std::vector<int> counts;
-  const std::vector<Vector3d> points{{1, 0, 5}, {-1, 0, 5}};
-  count_sightings(view, points, 1, counts);
-  count_sightings(view, points, 2, counts);
-  EXPECT_THAT(counts, testing::ElementsAre(2, 0));
+/// 10 x 10 pixels, looking along +z from the origin.
+PinholeCamera ten_pixels() {
+  PinholeCamera camera;
+  camera.intrinsics = {10, 10, 10, 10, 5, 5, 0};
+  return camera;
 }
 
 TEST(DepthPoints, AreWherePixelsSayTheyAre) {
-  ViewDepth view{two_walls().camera, Image(10, 10, 1, 0.0f)};
+  ViewDepth view{ten_pixels(), Image(10, 10, 1, 0.0f)};
   *view.depth.pixel(7, 4) = 4;
   const std::vector<Vector3d> points = depth_points({view}, {}, 1);
   ASSERT_EQ(points.size(), 1);
@@ -106,7 +85,7 @@ TEST(DepthPoints, AreWherePixelsSayTheyAre) {
 }
 
 TEST(DepthPoints, CountWhereEnoughViewsAgree) {
-  const PinholeCamera camera = two_walls().camera;
+  const PinholeCamera camera = ten_pixels();
   ViewDepth a{camera, Image(10, 10, 1, 4.0f)}, b = a, c = a;
   *b.depth.pixel(0, 0) = 4.4f;
   *c.depth.pixel(0, 0) = 0;
