@@ -22,7 +22,7 @@ echo "== measured against the truth -> $folder/metrics"
 
 first() { find "$1" -name "*.$2" | sort | head -n 1; }
 echo
-echo "Look at $folder/run/overview.png: photograph, rendered volume, depth, error."
+echo "Look at $folder/metrics/report.html (and $folder/run/overview.png: photograph, rendered volume, depth, error)."
 echo
 echo "For the first camera:"
 echo "  photograph        $(first "$folder/photographs/images" png)"

@@ -1,204 +1,231 @@
-/// roxel eval: a run against the truth (depth) and against its own photographs (reprojection).
+/// roxel eval: a run against the truth (surface, depth, colour) and against photographs.
 
+#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "command.h"
-#include "common.h"
+#include "eval_measure.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
-#include "roxel/eval/depth_accuracy.h"
-#include "roxel/eval/image_error.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
-#include "roxel/report/run_record.h"
+#include "roxel/report/html_report.h"
+#include "roxel/report/measure_plots.h"
+#include "roxel/report/pictures.h"
+#include "roxel/report/section_picture.h"
 
 namespace roxel::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
+
+constexpr Response kAsItIs{ResponseCurve::kLinear};
+
+struct TruthOptions {
+  std::optional<std::string> truth;
+  std::optional<std::string> dataset;
+};
+
+struct MeasureSwitches {
+  std::optional<std::string> depth_within;
+  std::optional<std::string> distances;
+  std::optional<std::string> estimate;
+  double opacity_threshold = 0.04;
+  int views_agree = 2;
+  int samples = 200000;
+  std::int64_t seed = 1;
+  std::optional<std::array<double, 3>> section;
+};
 
 struct EvalOptions {
-  std::optional<std::string> truth;
-  InputOptions input;
+  TruthOptions truth;
+  MeasureSwitches measures;
   CommonOptions common;
 };
 
+OptionTable<TruthOptions> truth_table() {
+  OptionTable<TruthOptions> table;
+  table.group("Truth");
+  table.add("truth", &TruthOptions::truth)
+      .help(
+          "Folder with depth/NAME.exr (true distance along the optical axis, 0 = no surface), mesh.ply, "
+          "albedo/NAME.exr; "
+          "what is missing is not measured")
+      .placeholder("DIR")
+      .unset("the data set, where it has depth or a mesh");
+  table.add("dataset", &TruthOptions::dataset)
+      .help("Where the run's photographs and cameras are now")
+      .placeholder("DATASET")
+      .unset("where the run has read them");
+  return table;
+}
+
+OptionTable<MeasureSwitches> measure_table() {
+  OptionTable<MeasureSwitches> table;
+  table.group("Measures");
+  table.add("depth-within", &MeasureSwitches::depth_within)
+      .help("Count pixels whose depth is within these distances, too")
+      .placeholder("D,...")
+      .unset("0.5, 1, 2, 4 and 8 voxels alone");
+  table.add("distances", &MeasureSwitches::distances)
+      .help("Distances of precision and recall")
+      .placeholder("D,...")
+      .unset("0.5 % and 1 % of the box's diagonal; 1, 2 and 4 voxels");
+  table.add("estimate", &MeasureSwitches::estimate)
+      .help("Measure this mesh or point set, too")
+      .placeholder("FILE.ply")
+      .unset("depth points and voxels of the run alone");
+  table.add("opacity-threshold", &MeasureSwitches::opacity_threshold)
+      .help("Voxels of at least this opacity are measured")
+      .range(0, 0.999)
+      .source("the default of reconstruct; fixed, so that runs compare");
+  table.add("views-agree", &MeasureSwitches::views_agree)
+      .help("Depth maps that must agree on a point of the stricter set of depth points")
+      .range(2, 1000);
+  table.add("samples", &MeasureSwitches::samples)
+      .help("Points drawn on the true surface, and on a mesh to measure")
+      .range(1000, 100000000)
+      .source("standard error of a share: at most 0.1 %");
+  table.add("seed", &MeasureSwitches::seed).help("Draws other points").at_least(0);
+  table.add("section", &MeasureSwitches::section)
+      .help("Point that the three cross-sections go through")
+      .unset("the middle of the box");
+  return table;
+}
+
 OptionTable<EvalOptions> eval_table() {
   OptionTable<EvalOptions> table;
-  table.group("Truth");
-  table.add("truth", &EvalOptions::truth)
-      .help("Folder with depth/NAME.exr: true distance along the optical axis, 0 = no surface")
-      .placeholder("DIR")
-      .unset("the data set, where it has a depth folder");
+  table.include(truth_table(), &EvalOptions::truth);
+  table.include(measure_table(), &EvalOptions::measures);
   table.include(common_option_table(), &EvalOptions::common);
   return table;
 }
 
-/// What is known of each view, from the run's files.
-struct Metrics {
-  std::vector<NamedDepthAccuracy> depth;
-  DepthAccuracy all_depth;
-  struct Reprojection {
-    std::string name;
-    double rms_percent;
-  };
-  std::vector<Reprojection> reprojection;
-};
-
-std::vector<std::string> view_names(const FinishedRun& run) {
-  std::vector<std::string> names;
-  for (const auto& view : run.summary.value("views", nlohmann::json::array()))
-    names.push_back(view.value("name", ""));
-  return names;
-}
-
-/// The true depth of a view: by its name, or by the file name alone.
-std::optional<fs::path> truth_file(const fs::path& truth, const std::string& name) {
-  for (const std::string& candidate : {name, fs::path(name).filename().string()}) {
-    const fs::path file = view_path(truth, "depth", candidate, ".exr");
-    if (fs::is_regular_file(file)) return file;
+/// "0.1,0.2": numbers above 0, sorted.
+std::vector<double> parse_distances(const std::optional<std::string>& text, const std::string& where) {
+  std::vector<double> distances;
+  if (!text) return distances;
+  const char *at = text->data(), *end = at + text->size();
+  for (;;) {
+    double value = 0;
+    const auto [stop, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || !(value > 0) || !std::isfinite(value) || (stop != end && *stop != ','))
+      throw_invalid(where, "\"" + *text + "\"", "distances above 0, separated by commas");
+    distances.push_back(value);
+    if (stop == end) break;
+    at = stop + 1;
   }
-  return {};
+  std::sort(distances.begin(), distances.end());
+  return distances;
 }
 
-std::optional<fs::path> truth_folder(const EvalOptions& options, const FinishedRun& run) {
-  if (options.truth) {
-    if (!fs::is_directory(fs::path(*options.truth) / "depth"))
-      throw_invalid("--truth " + *options.truth, "no folder depth in it",
-                    "depth/NAME.exr for the images of the run");
-    return *options.truth;
-  }
-  const fs::path dataset = run.file.info.dataset;
-  if (fs::is_directory(dataset / "depth")) return dataset;
-  return {};
+MeasureOptions measure_options(const MeasureSwitches& switches) {
+  MeasureOptions options;
+  options.depth_within = parse_distances(switches.depth_within, "--depth-within");
+  options.distances = parse_distances(switches.distances, "--distances");
+  options.opacity_threshold = switches.opacity_threshold;
+  options.views_agree = switches.views_agree;
+  options.samples = switches.samples;
+  options.seed = static_cast<std::uint64_t>(switches.seed);
+  options.section = switches.section;
+  return options;
 }
 
-DepthAccuracy view_accuracy(const fs::path& estimate_file, const fs::path& truth_path, double voxel_size) {
-  const DepthLayers estimate = read_depth(estimate_file);
-  const std::vector<FloatChannel> truth = read_exr_channels(truth_path.string());
-  const Image& plane = truth.front().plane;
-  if (plane.width() != estimate.depth.width() || plane.height() != estimate.depth.height())
-    throw_invalid(truth_path.string(),
-                  std::to_string(plane.width()) + " x " + std::to_string(plane.height()) + " pixels",
-                  std::to_string(estimate.depth.width()) + " x " + std::to_string(estimate.depth.height()) +
-                      " as " + estimate_file.string() + " has");
-  DepthAccuracyOptions options;
-  options.voxel_size = voxel_size;
-  return depth_accuracy({estimate.depth.data(), estimate.variance.data(), estimate.opacity.data()},
-                        plane.data(), options);
+Sources sources_of(const EvalSource& source) {
+  Sources sources{{source.run.path, source.truth.value_or(source.run.path)}};
+  if (source.input) sources.dataset = &source.input->dataset;
+  return sources;
 }
 
-void measure_depth(const FinishedRun& run, const fs::path& truth, const RunContext& context,
-                   Metrics& metrics) {
-  const double voxel_size = run.file.volume.index(0).frame().voxel_size;
-  for (const std::string& name : view_names(run)) {
-    context.throw_if_cancelled();
-    const fs::path estimate = depth_path(run.path, name);
-    const std::optional<fs::path> file = truth_file(truth, name);
-    if (!file || !fs::is_regular_file(estimate)) continue;
-    metrics.depth.push_back({name, view_accuracy(estimate, *file, voxel_size)});
-    if (metrics.depth.size() == 1)
-      metrics.all_depth = metrics.depth.front().accuracy;
-    else
-      metrics.all_depth.add(metrics.depth.back().accuracy);
-  }
+/// What was asked for by name must give something.
+void check_measured(const EvalOptions& options, const RunMeasures& measures) {
+  if (options.truth.truth && measures.depth.empty() && !measures.volume)
+    throw_invalid("--truth " + *options.truth.truth,
+                  "no depth/NAME.exr for any depth map of " + measures.run + ", and no mesh.ply",
+                  "files named like the images of the run");
+  if (measures.empty())
+    throw_invalid(measures.run, "neither truth nor renders to measure by",
+                  "--truth DIR, or a run with renders");
 }
 
-void take_reprojection(const FinishedRun& run, Metrics& metrics) {
-  for (const auto& view : run.summary.value("views", nlohmann::json::array())) {
-    const auto rms = view.find("reprojection_rms_percent");
-    if (rms != view.end() && rms->is_number())
-      metrics.reprojection.push_back({view.value("name", ""), rms->get<double>()});
-  }
-}
-
-ordered_json accuracy_json(const DepthAccuracy& accuracy) {
-  ordered_json within;
-  for (std::size_t i = 0; i < accuracy.thresholds.size(); ++i) {
-    char voxels[16];
-    std::snprintf(voxels, sizeof voxels, "%g", accuracy.thresholds[i]);
-    within[voxels] = accuracy.share_within(i);
-  }
-  return {{"true_pixels", accuracy.true_pixels},
-          {"share_found", accuracy.share_found()},
-          {"share_within_voxels", within},
-          {"bias_voxels", accuracy.bias_voxels()},
-          {"empty_pixels", accuracy.empty_pixels},
-          {"share_of_empty_given_depth", accuracy.share_false()},
-          {"share_within_sigma",
-           {{"1", accuracy.share_within_sigma(1)},
-            {"2", accuracy.share_within_sigma(2)},
-            {"3", accuracy.share_within_sigma(3)}}},
-          {"median_normalized_error", accuracy.median_normalized_error()}};
-}
-
-ordered_json metrics_json(const FinishedRun& run, const std::optional<fs::path>& truth,
-                          const Metrics& metrics) {
-  ordered_json json{
-      {"run", run.path.string()},
-      {"voxel_size", run.file.volume.index(0).frame().voxel_size},
-      {"reprojection_rms_percent", run.summary.value("reprojection_rms_percent", nlohmann::json())}};
-  json["depth"] = nullptr;
-  if (!metrics.depth.empty()) {
-    json["depth"] = accuracy_json(metrics.all_depth);
-    json["depth"]["truth"] = truth->string();
-    json["depth"]["views"] = ordered_json::array();
-    for (const NamedDepthAccuracy& view : metrics.depth) {
-      ordered_json entry{{"name", view.name}};
-      entry.update(accuracy_json(view.accuracy));
-      json["depth"]["views"].push_back(entry);
+/// Pictures that the run has of the views that the page shows, and the photographs where they are there.
+std::vector<ReportView> report_views_of(const EvalSource& source) {
+  std::vector<ReportView> views;
+  for (const int v : report_views(static_cast<int>(source.view_names.size()))) {
+    const std::string& name = source.view_names[v];
+    ReportView shown{name, {}, {}};
+    if (const View* view = source.view(name))
+      shown.pictures.push_back(report_picture(
+          "photograph", encoded_picture(source.input->load(*view).rgb, source.run.file.info.exposure,
+                                        source.picture_response())));
+    for (const char* kind : {"render", "error", "depth"})
+      if (const fs::path file = view_path(source.run.path, kind, name, ".png"); fs::is_regular_file(file))
+        shown.pictures.push_back(report_picture(kind, read_image(file.string(), kAsItIs).rgb));
+    if (const fs::path file = depth_path(source.run.path, name); fs::is_regular_file(file)) {
+      const DepthLayers layers = read_depth(file);
+      const Image truth = true_depth_of(source, name);
+      shown.pictures.push_back(
+          report_picture("sigma of depth",
+                         sigma_picture(layers.variance, layers.depth, layers.opacity, source.voxel_size())));
+      if (!truth.empty())
+        shown.pictures.push_back(report_picture(
+            "depth error", depth_error_picture(layers.depth, layers.opacity, truth, source.voxel_size())));
     }
+    if (!shown.pictures.empty()) views.push_back(std::move(shown));
   }
-  json["reprojection"] = ordered_json::array();
-  for (const auto& view : metrics.reprojection)
-    json["reprojection"].push_back({{"name", view.name}, {"rms_percent", view.rms_percent}});
-  return json;
+  return views;
 }
 
-std::string metrics_text(const FinishedRun& run, const Metrics& metrics) {
-  std::string text;
-  if (!metrics.depth.empty()) text += depth_accuracy_table(metrics.depth) + "\n";
-  const auto rms = run.summary.find("reprojection_rms_percent");
-  char line[96];
-  if (rms != run.summary.end() && rms->is_number()) {
-    std::snprintf(line, sizeof line, "reprojection error %.2f %% of full scale\n", rms->get<double>());
-    text += line;
-  }
-  return text;
+std::string report_page(const EvalSource& source, const RunMeasures& measures) {
+  ReportContent content{
+      nlohmann::ordered_json(source.run.summary), report_views_of(source), measures.sections, {}, &measures};
+  content.opacities = saved_voxels(source.run.file.volume, 0, 0).opacity;
+  return html_report(content);
+}
+
+void write_files(const fs::path& folder, const EvalSource& source, const RunMeasures& measures,
+                 const std::string& json) {
+  for (const auto& [name, table] : csv_tables(measures)) write_text_atomically(folder / name, table);
+  for (const auto& [name, plot] : measure_plots(measures))
+    write_text_atomically(folder / (name + ".svg"), svg_plot(plot));
+  for (const Section& section : measures.sections)
+    write_text_atomically(folder / (std::string("section_") + "xyz"[section.axis] + ".svg"),
+                          section_svg(section));
+  write_text_atomically(folder / "report.html", report_page(source, measures));
+  write_text_atomically(folder / "metrics.json", json + "\n");
 }
 
 int run_eval(const Invocation& invocation, const EvalOptions& options) {
   Session session(options.common);
-  const FinishedRun run = read_run(invocation.inputs.front());
-  const std::optional<fs::path> truth = truth_folder(options, run);
-  session.context().throw_if_cancelled();
-  if (!invocation.output.empty()) protect_sources(invocation.output, {{run.path, truth.value_or(run.path)}});
-  Metrics metrics;
-  if (truth) measure_depth(run, *truth, session.context(), metrics);
-  take_reprojection(run, metrics);
-  if (options.truth && metrics.depth.empty())
-    throw_invalid("--truth " + *options.truth, "no depth/NAME.exr for any depth map of " + run.path.string(),
-                  "files named like the images of the run");
-  if (metrics.depth.empty() && metrics.reprojection.empty())
-    throw_invalid(run.path.string(), "neither true depth nor renders to measure by",
-                  "--truth DIR, or a run with renders");
-  const std::string json = json_text(metrics_json(run, truth, metrics));
+  const MeasureOptions wanted = measure_options(options.measures);
+  const EvalSource source = read_eval_source(
+      {invocation.inputs.front(), options.truth.truth, options.truth.dataset, options.measures.estimate},
+      session);
+  std::optional<OutputFolder> folder;
   if (!invocation.output.empty()) {
-    const OutputFolder folder(invocation.output);
-    write_text_atomically(invocation.output / "metrics.json", json + "\n");
+    protect_sources(invocation.output, sources_of(source));
+    folder.emplace(invocation.output);
   }
-  print_result(options.common, metrics_text(run, metrics), json);
+  const RunMeasures measures = measure(source, wanted, session);
+  check_measured(options, measures);
+  const std::string json = json_text(to_json(measures));
+  if (folder) {
+    PartialResults partial(folder->path());
+    write_files(partial.path(), source, measures, json);
+    partial.publish();
+  }
+  session.display().clear();
+  print_result(options.common, to_text(measures), json);
   return 0;
 }
 
 }  // namespace
 
 void add_eval(Commands& commands) {
-  CommandForm form{"eval", "Measure a run: depth against the truth, renders against the photographs", "RUN",
-                   "DIR"};
+  CommandForm form{"eval", "Measure a run: against the truth, and renders against photographs", "RUN", "DIR"};
   form.output_required = false;
-  form.details = "Prints a table a view, in percent, and writes DIR/metrics.json with -o.\n";
+  form.details =
+      "Prints tables, and writes metrics.json, CSV tables, plots and report.html to DIR with -o.\n";
   add_command(commands, form, eval_table(), run_eval);
 }
 

@@ -9,6 +9,7 @@
 #include "roxel/base/content_hash.h"
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
+#include "roxel/eval/volume_accuracy.h"
 #include "roxel/io/voxels_ply.h"
 #include "view_writer.h"
 
@@ -23,6 +24,7 @@ struct StageSwitches {
   bool dry_run = false;
   bool depth = true;
   bool render = true;
+  bool report = true;
   bool save_surround = false;
 };
 
@@ -45,6 +47,7 @@ OptionTable<StageSwitches> stage_table() {
   table.add("depth", &StageSwitches::depth).help("Depth maps: depth/NAME.exr and .png");
   table.add("render", &StageSwitches::render)
       .help("Pictures of the input views: render/NAME.png and error/NAME.png");
+  table.add("report", &StageSwitches::report).help("A page to look at: report.html");
   table.add("save-surround", &StageSwitches::save_surround)
       .help("Keep the voxels around the box in volume.vdb");
   return table;
@@ -179,6 +182,7 @@ class Run {
     write_volume_files(results);
     write_views(results);
     session_.context().throw_if_cancelled();
+    if (options_.stages.report) write_report(results);
     const std::string json = write_summary(results);
     if (partial) partial->publish([&] { remove_results(folder); });
     say_results(json);
@@ -207,19 +211,35 @@ class Run {
     stages.depth = options_.stages.depth;
     stages.render = options_.stages.render;
     stages.progress_begin = kVolumeWritten;
+    if (options_.stages.report) writer.keep_for_report(made_.scene.voxel_size);
     for_each_view_result(input_.dataset, input_.load, made_, options_.reconstruct, stages, session_.context(),
                          [&](const ViewResult& result) { writer.write(result); });
     writer.write_overview();
     views_ = writer.figures();
+    report_views_ = writer.report_pictures();
     reprojection_rms_ = writer.reprojection_rms();
     if (stages.depth || stages.render)
       made_.summary.stages.push_back({"depth and pictures", stopwatch_.lap()});
   }
 
-  std::string write_summary(const std::filesystem::path& results) {
+  nlohmann::ordered_json summary_so_far() {
     made_.summary.seconds = stopwatch_.total();
     made_.summary.peak_memory_bytes = peak_memory_bytes();
-    const std::string json = json_text(to_json(make_record(session_.context().thread_count())));
+    return to_json(make_record(session_.context().thread_count()));
+  }
+
+  void write_report(const std::filesystem::path& results) {
+    ReportContent content{summary_so_far(), std::move(report_views_), {}, {}};
+    const Eigen::Vector3d middle = made_.scene.bounds.box.center();
+    for (int axis = 0; axis < 3; ++axis)
+      content.sections.push_back(opacity_section(made_.volume, axis, middle[axis]));
+    content.opacities = saved_voxels(made_.volume, 0, 0).opacity;
+    write_text_atomically(results / "report.html", html_report(content));
+    made_.summary.stages.push_back({"report", stopwatch_.lap()});
+  }
+
+  std::string write_summary(const std::filesystem::path& results) {
+    const std::string json = json_text(summary_so_far());
     write_text_atomically(results / "summary.json", json + "\n");
     return json;
   }
@@ -279,6 +299,7 @@ class Run {
   Stopwatch stopwatch_;
   Reconstruction made_;
   std::vector<ViewFigures> views_;
+  std::vector<ReportView> report_views_;
   std::optional<double> reprojection_rms_;
 };
 
@@ -293,7 +314,8 @@ void add_reconstruct(Commands& commands) {
                    "DATASET", "RUN"};
   form.output_required = false;  // a dry run writes nothing
   form.details =
-      "What is in RUN afterwards: summary.json, volume.vdb, voxels.ply, overview.png, and for every image\n"
+      "What is in RUN afterwards: summary.json, volume.vdb, voxels.ply, overview.png, report.html, and for "
+      "every image\n"
       "depth/NAME.exr (and .png), render/NAME.png, error/NAME.png.\n";
   add_command(commands, form, run_table(), run_reconstruct);
 }

@@ -6,10 +6,9 @@
 #include "common.h"
 #include "roxel/base/error.h"
 #include "roxel/io/image_file.h"
-#include "roxel/march/render.h"
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
-#include "roxel/solve/run_stages.h"
+#include "run_renderer.h"
 
 namespace roxel::cli {
 namespace {
@@ -39,19 +38,6 @@ OptionTable<RenderCommandOptions> render_table() {
   table.include(input_option_table(), &RenderCommandOptions::input);
   table.include(common_option_table(), &RenderCommandOptions::common);
   return table;
-}
-
-/// What the volume leaves of a ray: the option, else the run's own known background. Linear, 1 = white.
-std::array<float, 3> background(const RenderCommandOptions& options, const FinishedRun& run) {
-  std::array<float, 3> color{0, 0, 0};
-  const nlohmann::json scene = run.summary.value("scene", nlohmann::json::object());
-  const nlohmann::json known =
-      scene.value("background", nlohmann::json::object()).value("color", nlohmann::json());
-  for (int c = 0; c < 3; ++c) {
-    if (known.is_array() && known.size() == 3 && known[c].is_number()) color[c] = known[c].get<float>();
-    if (options.background_color) color[c] = static_cast<float>((*options.background_color)[c]);
-  }
-  return color;
 }
 
 void write_pictures(const std::filesystem::path& folder, const std::string& name,
@@ -94,17 +80,10 @@ int run_render(const Invocation& invocation, const RenderCommandOptions& options
   const Input input = read_cameras(run, options, session);
   protect_sources(invocation.output, {{run.path}, &input.dataset});
   const OutputFolder folder(invocation.output);
-  const Volume& volume = run.file.volume;
-  const LatticeStack stack(volume);
-  const auto colors = radiance_colors(volume, run.file.info.colors, 1);
-  RenderOptions render_options;
-  render_options.background = background(options, run);
-  render_options.surround = options.surround;
+  const RunRenderer renderer(run, {options.background_color, options.surround});
   const std::vector<View>& views = input.dataset.views;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    Stretch range{views[v].near.value_or(0), std::numeric_limits<double>::infinity()};
-    const Rendering rendering =
-        render(stack, colors, views[v].camera, range, render_options, session.context());
+    const Rendering rendering = renderer(views[v], session.context());
     write_pictures(invocation.output, views[v].name, rendering);
     write_planes(invocation.output, views[v].name, rendering, run.file.info.exposure);
     session.context().throw_if_cancelled();

@@ -4,6 +4,7 @@
 
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
+#include "roxel/report/markup.h"
 #include "roxel/report/pictures.h"
 
 namespace roxel::cli {
@@ -68,7 +69,10 @@ void ViewWriter::write(const ViewResult& result) {
     figures.reprojection_rms = error.rms_percent();
     figures.object_pixels = error.pixel_count;
   }
+  std::optional<ReportView> shown;
+  if (report_.contains(result.view_idx)) shown = report_view(result, figures, pictures);
   std::lock_guard lock(mutex_);
+  if (shown) report_.at(result.view_idx) = std::move(*shown);
   figures_[result.view_idx] = std::move(figures);
   error_.add(error);
   keep_for_overview(result.view_idx, pictures);
@@ -104,6 +108,35 @@ void ViewWriter::keep_for_overview(int view_idx, const Pictures& pictures) {
   if (!in_overview(view_idx, static_cast<int>(figures_.size()))) return;
   for (const Image* picture : {&pictures.photo, &pictures.render, &pictures.depth, &pictures.error})
     if (!picture->empty()) sheet_[view_idx].push_back(thumbnail(*picture, kThumbnailWidth));
+}
+
+void ViewWriter::keep_for_report(double voxel_size) {
+  voxel_size_ = voxel_size;
+  for (const int view_idx : report_views(static_cast<int>(figures_.size()))) report_[view_idx];
+}
+
+ReportView ViewWriter::report_view(const ViewResult& result, const ViewFigures& figures,
+                                   const Pictures& pictures) const {
+  ReportView view{figures.name, {}, {report_picture("photograph", pictures.photo)}};
+  if (figures.reprojection_rms) view.figures = "RMS " + short_number(*figures.reprojection_rms, 3) + " %";
+  if (!pictures.render.empty()) {
+    view.pictures.push_back(report_picture("render", pictures.render));
+    view.pictures.push_back(report_picture("error", pictures.error));
+  }
+  const DepthMap& map = result.depth;
+  if (!map.depth.empty()) {
+    view.pictures.push_back(report_picture("depth", pictures.depth));
+    view.pictures.push_back(
+        report_picture("sigma of depth", sigma_picture(map.variance, map.depth, map.opacity, voxel_size_)));
+  }
+  return view;
+}
+
+std::vector<ReportView> ViewWriter::report_pictures() const {
+  std::vector<ReportView> views;
+  for (const auto& [view_idx, view] : report_)
+    if (!view.pictures.empty()) views.push_back(view);
+  return views;
 }
 
 void ViewWriter::write_overview() const {

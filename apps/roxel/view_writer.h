@@ -9,6 +9,7 @@
 #include "roxel/color/response.h"
 #include "roxel/eval/image_error.h"
 #include "roxel/image/image.h"
+#include "roxel/report/html_report.h"
 #include "roxel/report/run_record.h"
 #include "roxel/solve/run_stages.h"
 
@@ -27,6 +28,10 @@ class ViewWriter {
 
   /// In the order of the data set's views, without hashes.
   const std::vector<ViewFigures>& figures() const { return figures_; }
+  /// Those of the page, in that order; empty without keep_for_report.
+  std::vector<ReportView> report_pictures() const;
+  /// Before the first write: pictures for the page are kept, deviations in voxels of this size.
+  void keep_for_report(double voxel_size);
   /// Over all views together; none where nothing was rendered.
   std::optional<double> reprojection_rms() const;
 
@@ -37,6 +42,8 @@ class ViewWriter {
   Pictures make_pictures(const ViewResult& result) const;
   void write_files(const ViewResult& result, const std::string& name, const Pictures& pictures) const;
   void keep_for_overview(int view_idx, const Pictures& pictures);
+  ReportView report_view(const ViewResult& result, const ViewFigures& figures,
+                         const Pictures& pictures) const;
 
   std::filesystem::path run_;
   const Dataset& dataset_;
@@ -46,6 +53,8 @@ class ViewWriter {
   std::vector<ViewFigures> figures_;
   ImageError error_;
   std::map<int, std::vector<Image>> sheet_;  ///< thumbnails by view
+  double voxel_size_ = 0;                    ///< 0: there is no report
+  std::map<int, ReportView> report_;         ///< by view, those that the page shows
 };
 
 /// The pixels whose error counts: the foreground where the view has a mask, else those more opaque than one

@@ -251,7 +251,7 @@ CHANGES = {
     "white-point": ([], ["--white-point", "A"]),
 }
 # Options that change files or what is said, and not the numbers; the tests of Switches are theirs.
-ELSEWHERE = {"depth", "dry-run", "init", "json", "quiet", "render", "save-surround", "threads", "verbose"}
+ELSEWHERE = {"depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "threads", "verbose"}
 
 
 def numbers(summary):
@@ -302,7 +302,7 @@ class Options(Case):
 
 class Switches(Case):
     def test_stages_can_be_left_out(self):
-        out, summary = self.reconstruct("bare", "--no-depth", "--no-render")
+        out, summary = self.reconstruct("bare", "--no-depth", "--no-render", "--no-report")
         self.assertEqual(files_below(out), ["summary.json", "volume.vdb", "voxels.ply"])
         self.assertIsNone(summary["reprojection_rms_percent"])
         out, summary = self.reconstruct("depth-only", "--no-render")
@@ -361,7 +361,7 @@ class Files(Case):
     def test_a_run_holds_what_the_format_page_lists(self):
         out, summary = self.reconstruct("run")
         views = [f"00{i}" for i in range(4)]
-        expected = ["summary.json", "volume.vdb", "voxels.ply", "overview.png"]
+        expected = ["summary.json", "volume.vdb", "voxels.ply", "overview.png", "report.html"]
         expected += [f"depth/{v}.exr" for v in views]
         expected += [f"{kind}/{v}.png" for kind in ("depth", "render", "error") for v in views]
         self.assertEqual(files_below(out), sorted(expected))
@@ -424,7 +424,7 @@ class OtherCommands(Case):
         self.assertIn("| 003 |", table)
         metrics = json.loads((out / "metrics.json").read_text())
         within = metrics["depth"]["share_within_voxels"]
-        self.assertEqual(list(within), ["0.5", "1", "2", "4"])
+        self.assertEqual(list(within), ["0.5", "1", "2", "4", "8"])
         shares = list(within.values())
         self.assertEqual(shares, sorted(shares))
         self.assertGreater(within["4"], 0.5)

@@ -13,7 +13,8 @@ double share(std::int64_t part, std::int64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-void check(const DepthEstimate& estimate, std::span<const float> truth, const DepthAccuracyOptions& options) {
+void check(const EstimatedDepth& estimate, std::span<const float> truth,
+           const DepthAccuracyOptions& options) {
   ROXEL_CHECK_EQ(estimate.depth.size(), truth.size());
   if (!estimate.variance.empty()) ROXEL_CHECK_EQ(estimate.variance.size(), truth.size());
   if (!estimate.opacity.empty()) ROXEL_CHECK_EQ(estimate.opacity.size(), truth.size());
@@ -23,11 +24,16 @@ void check(const DepthEstimate& estimate, std::span<const float> truth, const De
 }
 
 /// Errors are compared in doubles; a float depth carries 6e-8, far below any voxel.
-void count_found(DepthAccuracy& sums, double error_voxels, double sigma_voxels) {
+void count_found(DepthAccuracy& sums, double error_voxels, double sigma_voxels, double voxel_size) {
   ++sums.found_pixels;
   const double distance = std::abs(error_voxels);
   for (std::size_t i = 0; i < sums.thresholds.size(); ++i) sums.within[i] += distance <= sums.thresholds[i];
-  if (distance <= sums.thresholds.back()) sums.signed_error_voxels += error_voxels;
+  for (std::size_t i = 0; i < sums.distances.size(); ++i)
+    sums.within_distance[i] += distance * voxel_size <= sums.distances[i];
+  if (distance <= DepthAccuracy::kBiasVoxels) {
+    ++sums.bias_pixels;
+    sums.signed_error_voxels += error_voxels;
+  }
   if (!(sigma_voxels > 0)) return;
   ++sums.calibrated_pixels;
   const double bins = std::ceil(distance / sigma_voxels * DepthAccuracy::kBinsPerSigma) - 1;
@@ -44,6 +50,10 @@ std::string row(const std::string& name, const DepthAccuracy& a) {
     std::snprintf(cell, sizeof cell, " | %.2f", 100 * a.share_within(i));
     out += cell;
   }
+  for (std::size_t i = 0; i < a.distances.size(); ++i) {
+    std::snprintf(cell, sizeof cell, " | %.2f", 100 * a.share_within_distance(i));
+    out += cell;
+  }
   std::snprintf(cell, sizeof cell, " | %.2f | %.2f | %+.3f", 100 * a.share_found(), 100 * a.share_false(),
                 a.bias_voxels());
   out += cell;
@@ -57,12 +67,14 @@ std::string row(const std::string& name, const DepthAccuracy& a) {
 }  // namespace
 
 double DepthAccuracy::share_within(std::size_t i) const { return share(within.at(i), true_pixels); }
+double DepthAccuracy::share_within_distance(std::size_t i) const {
+  return share(within_distance.at(i), true_pixels);
+}
 double DepthAccuracy::share_found() const { return share(found_pixels, true_pixels); }
 double DepthAccuracy::share_false() const { return share(false_pixels, empty_pixels); }
 
 double DepthAccuracy::bias_voxels() const {
-  const std::int64_t count = within.empty() ? 0 : within.back();
-  return count > 0 ? signed_error_voxels / static_cast<double>(count) : 0.0;
+  return bias_pixels > 0 ? signed_error_voxels / static_cast<double>(bias_pixels) : 0.0;
 }
 
 double DepthAccuracy::share_within_sigma(double k) const {
@@ -84,6 +96,7 @@ double DepthAccuracy::median_normalized_error() const {
 
 void DepthAccuracy::add(const DepthAccuracy& other) {
   ROXEL_CHECK(thresholds == other.thresholds);
+  ROXEL_CHECK(distances == other.distances);
   true_pixels += other.true_pixels;
   found_pixels += other.found_pixels;
   empty_pixels += other.empty_pixels;
@@ -91,16 +104,20 @@ void DepthAccuracy::add(const DepthAccuracy& other) {
   signed_error_voxels += other.signed_error_voxels;
   calibrated_pixels += other.calibrated_pixels;
   for (std::size_t i = 0; i < within.size(); ++i) within[i] += other.within[i];
+  for (std::size_t i = 0; i < distances.size(); ++i) within_distance[i] += other.within_distance[i];
+  bias_pixels += other.bias_pixels;
   for (std::size_t i = 0; i < normalized_errors.size(); ++i)
     normalized_errors[i] += other.normalized_errors[i];
 }
 
-DepthAccuracy depth_accuracy(const DepthEstimate& estimate, std::span<const float> truth,
+DepthAccuracy depth_accuracy(const EstimatedDepth& estimate, std::span<const float> truth,
                              const DepthAccuracyOptions& options) {
   check(estimate, truth, options);
   DepthAccuracy sums;
   sums.thresholds = options.thresholds;
   sums.within.assign(options.thresholds.size(), 0);
+  sums.distances = options.distances;
+  sums.within_distance.assign(options.distances.size(), 0);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const float z = estimate.depth[i];
     const float opacity = estimate.opacity.empty() ? 1.0f : estimate.opacity[i];
@@ -112,13 +129,14 @@ DepthAccuracy depth_accuracy(const DepthEstimate& estimate, std::span<const floa
       ++sums.true_pixels;
       if (!has_depth) continue;
       const double sigma = estimate.variance.empty() ? 0.0 : std::sqrt(std::max(0.0f, estimate.variance[i]));
-      count_found(sums, (static_cast<double>(z) - truth[i]) / options.voxel_size, sigma / options.voxel_size);
+      count_found(sums, (static_cast<double>(z) - truth[i]) / options.voxel_size, sigma / options.voxel_size,
+                  options.voxel_size);
     }
   }
   return sums;
 }
 
-std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views) {
+std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views, std::size_t most_views) {
   if (views.empty()) return "";
   char cell[64];
   std::string head = "| view | pixels", rule = "|---|---:";
@@ -128,11 +146,16 @@ std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views) {
     head += cell;
     rule += "|---:";
   }
+  for (double distance : all.distances) {
+    std::snprintf(cell, sizeof cell, " | within %g units %%", distance);
+    head += cell;
+    rule += "|---:";
+  }
   std::string out = head + " | with depth % | empty given depth % | bias | in 1 sigma % | 2 | 3 |\n" + rule +
                     "|---:|---:|---:|---:|---:|---:|\n";
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i > 0) all.add(views[i].accuracy);
-    out += row(views[i].name, views[i].accuracy);
+    if (views.size() <= most_views) out += row(views[i].name, views[i].accuracy);
   }
   return out + row("**all**", all);
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,16 +13,17 @@
 namespace roxel {
 
 /// What a reconstruction says of one view.
-struct DepthEstimate {
+struct EstimatedDepth {
   std::span<const float> depth;
   std::span<const float> variance;  ///< of the depth, world units squared; empty = no calibration figures
   std::span<const float> opacity;   ///< of the ray, in [0, 1]; empty = 1 everywhere
 };
 
 struct DepthAccuracyOptions {
-  double voxel_size = 1;                            ///< world units; the unit of errors and thresholds
-  std::vector<double> thresholds = {0.5, 1, 2, 4};  ///< in voxels, ascending
-  float opacity_threshold = 0.5f;                   ///< a pixel has depth where its opacity exceeds this
+  double voxel_size = 1;                               ///< world units; the unit of errors and thresholds
+  std::vector<double> thresholds = {0.5, 1, 2, 4, 8};  ///< in voxels, ascending
+  std::vector<double> distances = {};                  ///< further thresholds, in world units
+  float opacity_threshold = 0.5f;                      ///< a pixel has depth where its opacity exceeds this
 };
 
 /// Counts over any number of views; add() joins them, so that shares are of all pixels together.
@@ -32,24 +34,29 @@ struct DepthAccuracyOptions {
 struct DepthAccuracy {
   std::vector<double> thresholds;  ///< in voxels
   std::int64_t true_pixels = 0;
-  std::int64_t found_pixels = 0;     ///< true pixels that were given depth
-  std::vector<std::int64_t> within;  ///< true pixels whose error is at most thresholds[i]
+  std::int64_t found_pixels = 0;              ///< true pixels that were given depth
+  std::vector<std::int64_t> within;           ///< true pixels whose error is at most thresholds[i]
+  std::vector<double> distances;              ///< in world units
+  std::vector<std::int64_t> within_distance;  ///< true pixels whose error is at most distances[i]
   std::int64_t empty_pixels = 0;
-  std::int64_t false_pixels = 0;       ///< empty pixels that were given depth
-  double signed_error_voxels = 0;      ///< summed over the pixels within the last threshold
-  std::int64_t calibrated_pixels = 0;  ///< found pixels with a variance > 0
+  std::int64_t false_pixels = 0;            ///< empty pixels that were given depth
+  static constexpr double kBiasVoxels = 4;  ///< outliers beyond would drown the bias
+  std::int64_t bias_pixels = 0;             ///< found pixels within kBiasVoxels
+  double signed_error_voxels = 0;           ///< summed over them
+  std::int64_t calibrated_pixels = 0;       ///< found pixels with a variance > 0
   /// Counts of |error| / sigma in bins of 1 / kBinsPerSigma; the last bin takes the rest.
-  static constexpr int kBinsPerSigma = 20;
+  static constexpr int kBinsPerSigma = 25;  ///< so that 1 and 1.96 are edges
   std::array<std::int64_t, 10 * kBinsPerSigma + 1> normalized_errors{};
 
   /// Share in [0, 1] of true pixels within thresholds[i]; a true pixel without depth counts as wrong.
   double share_within(std::size_t i) const;
+  /// The same for distances[i].
+  double share_within_distance(std::size_t i) const;
   /// Share in [0, 1] of true pixels that were given depth.
   double share_found() const;
   /// Share in [0, 1] of empty pixels that were given depth.
   double share_false() const;
-  /// Mean of estimate minus truth in voxels, over the pixels within the last threshold (outliers would drown
-  /// it).
+  /// Mean of estimate minus truth in voxels, over the pixels within kBiasVoxels.
   double bias_voxels() const;
   /// Share in [0, 1] of calibrated pixels with |error| <= k sigma, k a multiple of 1 / kBinsPerSigma up to
   /// 10; honest Gaussian variances give 0.683, 0.954, 0.997 at k = 1, 2, 3.
@@ -57,12 +64,12 @@ struct DepthAccuracy {
   /// Median of |error| / sigma, to a bin; honest Gaussian variances give 0.674; above: overconfident.
   double median_normalized_error() const;
 
-  /// Both must have the same thresholds.
+  /// Both must have the same thresholds and distances.
   void add(const DepthAccuracy& other);
 };
 
 /// Throws std::logic_error where sizes differ or options are out of range. Every share of nothing is 0.
-DepthAccuracy depth_accuracy(const DepthEstimate& estimate, std::span<const float> truth,
+DepthAccuracy depth_accuracy(const EstimatedDepth& estimate, std::span<const float> truth,
                              const DepthAccuracyOptions& options);
 
 /// One row of a table.
@@ -71,7 +78,9 @@ struct NamedDepthAccuracy {
   DepthAccuracy accuracy;
 };
 
-/// A Markdown table, in percent: a row a view, and a last row "all" with the sums.
-std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views);
+/// A Markdown table, in percent: a row a view where those are at most `most_views`, and a last row "all" with
+/// the sums.
+std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views,
+                                 std::size_t most_views = std::numeric_limits<std::size_t>::max());
 
 }  // namespace roxel

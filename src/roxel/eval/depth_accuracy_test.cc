@@ -20,11 +20,14 @@ TEST(DepthAccuracy, ByHand) {
   const std::vector<float> opacity = {1, 1, 0.9f, 1, 1, 0.5f, 0, 0.9f, 0.4f};
   DepthAccuracyOptions options;
   options.voxel_size = 0.5;
+  options.distances = {0.41, 2};
   const DepthAccuracy found = depth_accuracy({depth, {}, opacity}, truth, options);
   EXPECT_EQ(found.true_pixels, 6);
   EXPECT_EQ(found.found_pixels, 4);
-  EXPECT_THAT(found.within, testing::ElementsAre(1, 2, 2, 3));
+  EXPECT_THAT(found.within, testing::ElementsAre(1, 2, 2, 3, 4));
   EXPECT_DOUBLE_EQ(found.share_within(3), 0.5);
+  EXPECT_THAT(found.within_distance, testing::ElementsAre(2, 3));
+  EXPECT_DOUBLE_EQ(found.share_within_distance(1), 0.5);
   EXPECT_DOUBLE_EQ(found.share_found(), 4 / 6.0);
   EXPECT_EQ(found.empty_pixels, 3);
   EXPECT_EQ(found.false_pixels, 1);
@@ -101,7 +104,8 @@ TEST(DepthAccuracy, TableHasARowAViewAndTheSum) {
   EXPECT_THAT(table, testing::HasSubstr("| a | 2 | 100.00 |"));
   EXPECT_THAT(table, testing::HasSubstr("| b | 2 | 0.00 |"));
   EXPECT_THAT(table,
-              testing::HasSubstr("| **all** | 4 | 50.00 | 50.00 | 50.00 | 50.00 | 100.00 | 0.00 | +0.000 |"));
+              testing::HasSubstr(
+                  "| **all** | 4 | 50.00 | 50.00 | 50.00 | 50.00 | 100.00 | 100.00 | 0.00 | +0.000 |"));
 }
 
 TEST(DepthAccuracy, RefusesPlanesOfDifferentSizes) {

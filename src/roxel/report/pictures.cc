@@ -13,6 +13,7 @@ using Color = std::array<float, 3>;
 
 constexpr int kGap = 6;
 constexpr float kSheetGrey = 0.12f;
+constexpr float kNoSigmaGrey = 0.75f;
 
 /// Far to near.
 constexpr std::array<Color, 7> kDepthColors{{{0.13f, 0.14f, 0.36f},
@@ -30,6 +31,9 @@ constexpr std::array<Color, 6> kHeatColors{{{0.00f, 0.00f, 0.00f},
                                             {0.95f, 0.40f, 0.10f},
                                             {1.00f, 0.80f, 0.25f},
                                             {1.00f, 1.00f, 1.00f}}};
+
+constexpr Color kTooNear{0.13f, 0.30f, 0.70f};
+constexpr Color kTooFar{0.75f, 0.10f, 0.10f};
 
 template <std::size_t N>
 Color blend(const std::array<Color, N>& colors, float position) {
@@ -120,6 +124,38 @@ Image error_picture(const Image& render, const Image& photo, const Mask& valid, 
         squared += difference * difference / 3;
       }
       const Color color = blend(kHeatColors, std::sqrt(squared) / kHottestError);
+      std::copy(color.begin(), color.end(), picture.pixel(x, y));
+    }
+  return picture;
+}
+
+Image sigma_picture(const Image& variance, const Image& depth, const Image& opacity, double voxel_size) {
+  Image picture(variance.width(), variance.height(), 3, kNoSigmaGrey);
+  for (int y = 0; y < picture.height(); ++y)
+    for (int x = 0; x < picture.width(); ++x) {
+      if (!has_depth(depth, opacity, x, y)) continue;
+      const float sigma = std::sqrt(std::max(0.0f, *variance.pixel(x, y))) / static_cast<float>(voxel_size);
+      const Color color = blend(kHeatColors, sigma / kHottestSigma);
+      std::copy(color.begin(), color.end(), picture.pixel(x, y));
+    }
+  return picture;
+}
+
+Image depth_error_picture(const Image& depth, const Image& opacity, const Image& truth, double voxel_size) {
+  ROXEL_CHECK_EQ(depth.width(), truth.width());
+  ROXEL_CHECK_EQ(depth.height(), truth.height());
+  Image picture(depth.width(), depth.height(), 3, kNoSigmaGrey);
+  for (int y = 0; y < picture.height(); ++y)
+    for (int x = 0; x < picture.width(); ++x) {
+      const bool found = has_depth(depth, opacity, x, y), true_surface = *truth.pixel(x, y) > 0;
+      if (!found && !true_surface) continue;
+      Color color{0, 0, 0};
+      if (found && true_surface) {
+        const float error = (*depth.pixel(x, y) - *truth.pixel(x, y)) / static_cast<float>(voxel_size);
+        const float fade = std::min(std::abs(error) / kFullestDepthError, 1.0f);
+        const Color& full = error < 0 ? kTooNear : kTooFar;
+        for (int c = 0; c < 3; ++c) color[c] = 1 + fade * (full[c] - 1);
+      }
       std::copy(color.begin(), color.end(), picture.pixel(x, y));
     }
   return picture;

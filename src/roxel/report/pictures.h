@@ -34,6 +34,21 @@ inline constexpr float kHottestError = 0.25f;
 /// black.
 Image error_picture(const Image& render, const Image& photo, const Mask& valid, const Mask& foreground);
 
+/// Deviation at which the heat is white, in voxels.
+inline constexpr float kHottestSigma = 4;
+
+/// The deviation of depths as heat: black (sure), violet, red, yellow, white (kHottestSigma voxels and more).
+/// Grey where a pixel has no depth, or is not more opaque than one half.
+Image sigma_picture(const Image& variance, const Image& depth, const Image& opacity, double voxel_size);
+
+/// Error of a depth at which its picture is fullest, in voxels.
+inline constexpr float kFullestDepthError = 4;
+
+/// Depths against the truth (0 = no surface): white where they agree, blue where they are too near, red too
+/// far, full at kFullestDepthError voxels and more. Black where only one of the two has a depth, grey where
+/// neither has. An estimate has a depth where it is more opaque than one half.
+Image depth_error_picture(const Image& depth, const Image& opacity, const Image& truth, double voxel_size);
+
 /// The picture at most `width` wide, averaged over areas; never enlarged.
 Image thumbnail(const Image& picture, int width);
 

@@ -102,6 +102,38 @@ TEST(ErrorPicture, IsTheRootMeanSquareOverTheChannels) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.pixel(0, 0)[c], b.pixel(0, 0)[c], 1e-4);
 }
 
+TEST(SigmaPicture, IsBlackWhereDepthIsSureAndGreyWhereThereIsNone) {
+  Image depth(4, 1, 1, 2.0f), opacity(4, 1, 1, 1.0f), variance(4, 1, 1);
+  const float voxel = 0.5f;
+  *variance.pixel(1, 0) = std::pow(kHottestSigma / 2 * voxel, 2.0f);
+  *variance.pixel(2, 0) = std::pow(kHottestSigma * voxel, 2.0f);
+  *depth.pixel(3, 0) = 0;
+  const Image heat = sigma_picture(variance, depth, opacity, voxel);
+  EXPECT_EQ(brightness(heat.pixel(0, 0)), 0);
+  EXPECT_GT(brightness(heat.pixel(1, 0)), 0.5f);
+  EXPECT_LT(brightness(heat.pixel(1, 0)), 2);
+  EXPECT_NEAR(brightness(heat.pixel(2, 0)), 3, 1e-4);
+  EXPECT_NEAR(brightness(heat.pixel(3, 0)), 3 * 0.75f, 1e-4);
+}
+
+TEST(DepthErrorPicture, TellsNearFromFarAndMissingFromRight) {
+  const float voxel = 0.5f;
+  Image truth(6, 1, 1, 10.0f), depth = truth, opacity(6, 1, 1, 1.0f);
+  *depth.pixel(1, 0) = 10 - kFullestDepthError * voxel;
+  *depth.pixel(2, 0) = 10 + kFullestDepthError * voxel;
+  *depth.pixel(3, 0) = 10 + kFullestDepthError * voxel / 2;
+  *opacity.pixel(4, 0) = 0.4f;
+  *opacity.pixel(5, 0) = 0.4f;
+  *truth.pixel(5, 0) = 0;
+  const Image picture = depth_error_picture(depth, opacity, truth, voxel);
+  EXPECT_EQ(brightness(picture.pixel(0, 0)), 3);
+  EXPECT_GT(picture.pixel(1, 0)[2], picture.pixel(1, 0)[0] + 0.3f);  // too near: blue
+  EXPECT_GT(picture.pixel(2, 0)[0], picture.pixel(2, 0)[2] + 0.3f);  // too far: red
+  EXPECT_GT(brightness(picture.pixel(3, 0)), brightness(picture.pixel(2, 0)));
+  EXPECT_EQ(brightness(picture.pixel(4, 0)), 0);  // missed
+  EXPECT_NEAR(brightness(picture.pixel(5, 0)), 3 * 0.75f, 1e-6);
+}
+
 TEST(Thumbnail, AveragesAreasAndNeverEnlarges) {
   Image picture(6, 4, 3);
   for (int y = 0; y < 4; ++y)

@@ -187,7 +187,8 @@ void remove_results(const fs::path& run) {
   }
   std::error_code ignored;
   fs::remove(run / "summary.json", ignored);
-  for (const char* name : {"volume.vdb", "voxels.ply", "overview.png"}) fs::remove(run / name, ignored);
+  for (const char* name : {"volume.vdb", "voxels.ply", "overview.png", "report.html"})
+    fs::remove(run / name, ignored);
   for (const json& view : summary.value("views", json::array())) {
     const std::string name = view.value("name", "");
     if (name.empty()) continue;

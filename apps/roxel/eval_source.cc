@@ -1,0 +1,133 @@
+#include "eval_source.h"
+
+#include "roxel/base/error.h"
+#include "roxel/io/ply_file.h"
+
+namespace roxel::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> names_of_views(const FinishedRun& run) {
+  std::vector<std::string> names;
+  for (const auto& view : run.summary.value("views", nlohmann::json::array()))
+    names.push_back(view.value("name", ""));
+  return names;
+}
+
+/// The bounds of the summary, or the box of the lattice where it has none (merged runs).
+Eigen::AlignedBox3d box_of(const FinishedRun& run) {
+  const nlohmann::json bounds =
+      run.summary.value("scene", nlohmann::json::object()).value("bounds", nlohmann::json::array());
+  if (!bounds.is_array() || bounds.size() != 6) return run.file.volume.index(0).frame().box();
+  const auto v = bounds.get<std::vector<double>>();
+  return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
+}
+
+/// Input options as the run used them.
+InputOptions input_options(const FinishedRun& run) {
+  InputOptions options;
+  const auto text = [&](const char* name, auto& target) {
+    if (const nlohmann::json& value = run.option(name); value.is_string()) target = value.get<std::string>();
+  };
+  text("format", options.format);
+  text("images", options.images);
+  text("nodes", options.nodes);
+  text("masks", options.masks);
+  text("response", options.response);
+  return options;
+}
+
+void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSource& source) {
+  const std::string path = paths.dataset.value_or(source.run.file.info.dataset);
+  if (path.empty() || (!paths.dataset && !fs::exists(path))) {
+    source.notes.push_back("the run's data set " + path +
+                           " is not there: cameras and photographs are not known (--dataset)");
+    return;
+  }
+  try {
+    source.input = read_input(path, input_options(source.run), session);
+  } catch (const InvalidInput& error) {
+    if (paths.dataset) throw;
+    source.notes.push_back(std::string("the run's data set cannot be read as it was: ") + error.what() +
+                           " (--dataset)");
+    return;
+  }
+  for (const View& view : source.input->dataset.views) source.views[view.name] = &view;
+}
+
+std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& source) {
+  if (paths.truth) {
+    if (!has_truth(*paths.truth))
+      throw_invalid("--truth " + *paths.truth, "no folder depth and no mesh.ply in it",
+                    "depth/NAME.exr for the images of the run, or mesh.ply");
+    return *paths.truth;
+  }
+  const fs::path dataset = paths.dataset.value_or(source.run.file.info.dataset);
+  if (!dataset.empty() && has_truth(dataset)) return dataset;
+  return {};
+}
+
+void read_surfaces(const EvalPaths& paths, EvalSource& source) {
+  if (source.truth && fs::is_regular_file(*source.truth / "mesh.ply"))
+    source.surface = read_ply(*source.truth / "mesh.ply");
+  if (!paths.estimate) return;
+  if (!source.surface)
+    throw_invalid("--estimate " + *paths.estimate, "no true surface to measure it by",
+                  "a truth with mesh.ply");
+  source.estimate = read_ply(*paths.estimate);
+  source.estimate_name = fs::path(*paths.estimate).filename().string();
+}
+
+void read_held_out(const Session& session, EvalSource& source) {
+  for (const fs::path& folder :
+       {source.truth.value_or(""), source.input ? fs::path(source.input->dataset.path) : fs::path()}) {
+    const fs::path file = folder / "transforms_test.json";
+    if (folder.empty() || !fs::is_regular_file(file)) continue;
+    InputOptions options = input_options(source.run);
+    options.format = "transforms";
+    options.images.reset();
+    options.nodes.reset();
+    source.held_out = read_input(file.string(), options, session);
+    return;
+  }
+}
+
+}  // namespace
+
+const View* EvalSource::view(const std::string& name) const {
+  const auto found = views.find(name);
+  return found == views.end() ? nullptr : found->second;
+}
+
+Response EvalSource::picture_response() const {
+  return run.file.info.exposure == 1 && input && input->response ? *input->response : Response{};
+}
+
+bool has_truth(const fs::path& folder) {
+  return fs::is_directory(folder / "depth") || fs::is_regular_file(folder / "mesh.ply");
+}
+
+std::optional<fs::path> truth_file(const fs::path& truth, const std::string& kind, const std::string& name) {
+  for (const std::string& candidate : {name, fs::path(name).filename().string()}) {
+    const fs::path file = view_path(truth, kind, candidate, ".exr");
+    if (fs::is_regular_file(file)) return file;
+  }
+  return {};
+}
+
+EvalSource read_eval_source(const EvalPaths& paths, const Session& session) {
+  EvalSource source;
+  source.run = read_run(paths.run);
+  session.context().throw_if_cancelled();
+  source.view_names = names_of_views(source.run);
+  source.box = box_of(source.run);
+  read_dataset_of_run(paths, session, source);
+  source.truth = truth_folder(paths, source);
+  read_surfaces(paths, source);
+  read_held_out(session, source);
+  session.context().throw_if_cancelled();
+  return source;
+}
+
+}  // namespace roxel::cli

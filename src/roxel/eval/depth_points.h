@@ -1,0 +1,27 @@
+#pragma once
+/// The points that the depth maps of a run show, as one set.
+
+#include <vector>
+
+#include "roxel/camera/camera.h"
+#include "roxel/image/image.h"
+
+namespace roxel {
+
+/// The depth map of one view; 1 channel, along the optical axis, 0 = none.
+struct ViewDepth {
+  PinholeCamera camera;
+  Image depth;
+};
+
+struct DepthPointOptions {
+  int views_that_agree =
+      1;                 ///< a pixel counts where the maps of so many views, its own one among them, agree
+  double tolerance = 0;  ///< how far depths may differ along the other view's axis to agree, world units
+};
+
+/// One point a pixel with depth, in the order of views and pixels.
+std::vector<Eigen::Vector3d> depth_points(const std::vector<ViewDepth>& views,
+                                          const DepthPointOptions& options, int threads);
+
+}  // namespace roxel

@@ -1,0 +1,16 @@
+#pragma once
+/// Pictures as the bytes of an image file, for pages that hold their pictures themselves.
+
+#include <string>
+
+#include "roxel/image/image.h"
+
+namespace roxel {
+
+/// Display values in [0, 1] as they are, 3 channels, as JPEG; quality 1 to 100. Throws IoError.
+std::string jpeg_bytes(const Image& picture, int quality = 80);
+
+/// 8-bit PNG of 1 or 3 channels, display values in [0, 1] as they are. Throws IoError.
+std::string png_bytes(const Image& picture);
+
+}  // namespace roxel

@@ -1,0 +1,70 @@
+#pragma once
+/// All that `roxel eval` measures of a run, and as JSON, CSV and text. docs/evaluation.md says what each
+/// figure is.
+
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "roxel/eval/color_accuracy.h"
+#include "roxel/eval/depth_accuracy.h"
+#include "roxel/eval/image_quality.h"
+#include "roxel/eval/reliability.h"
+#include "roxel/eval/section.h"
+#include "roxel/eval/surface_accuracy.h"
+#include "roxel/eval/volume_accuracy.h"
+
+namespace roxel {
+
+struct NamedSurfaceAccuracy {
+  std::string name;  ///< what was measured: "depth points", "voxels", "estimate"
+  SurfaceAccuracy accuracy;
+};
+
+struct NamedImageQuality {
+  std::string name;
+  ImageQuality object;  ///< over the pixels that show the object
+  ImageQuality all;     ///< over all valid pixels
+};
+
+/// Parts that could not be measured are empty; `notes` says why.
+struct RunMeasures {
+  std::string run;
+  std::optional<std::string> truth;
+  double voxel_size = 0;
+  Eigen::AlignedBox3d box;                         ///< of the run; surfaces count inside it
+  std::optional<double> reprojection_rms_percent;  ///< of summary.json, as are the next
+  std::vector<std::pair<std::string, double>> reprojection;
+
+  std::vector<NamedDepthAccuracy> depth;
+  std::optional<Reliability> opacity_reliability;
+  std::int64_t surface_samples = 0;  ///< of the true surface in the box
+  double surface_seen = 0;           ///< share of them that two views see
+  std::vector<NamedSurfaceAccuracy> surfaces;
+  std::optional<VolumeAccuracy> volume;
+  double opacity_threshold = 0;  ///< of the voxels that count in `volume`
+  std::vector<NamedImageQuality> images;
+  std::vector<NamedImageQuality> held_out;  ///< views that the run has not seen
+  std::optional<ColorAccuracy> color;
+  std::vector<Section> sections;  ///< with the true outline
+  std::vector<std::string> notes;
+
+  double box_diagonal() const { return box.isEmpty() ? 0.0 : box.diagonal().norm(); }
+  bool empty() const;
+};
+
+/// Of all views together.
+DepthAccuracy total_depth(const std::vector<NamedDepthAccuracy>& views);
+NamedImageQuality total_quality(const std::vector<NamedImageQuality>& views);
+
+nlohmann::ordered_json to_json(const RunMeasures& measures);
+
+/// Name of a file and its content: one table each, comma-separated, with a line of headings.
+std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& measures);
+
+/// For a terminal; views are listed up to `most_views`.
+std::string to_text(const RunMeasures& measures, std::size_t most_views = 32);
+
+}  // namespace roxel

@@ -1,0 +1,124 @@
+#include "roxel/report/run_measures.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "roxel/report/measure_plots.h"
+
+namespace roxel {
+namespace {
+
+using testing::HasSubstr;
+
+/// Two views with a pixel each, one surface, four voxels.
+RunMeasures some_measures() {
+  RunMeasures m;
+  m.run = "run";
+  m.truth = "truth";
+  m.voxel_size = 0.5;
+  m.box = Eigen::AlignedBox3d(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(3, 4, 12));
+  DepthAccuracyOptions options;
+  options.voxel_size = 0.5;
+  options.distances = {0.3};
+  const std::vector<float> truth{4}, good{4.2f}, bad{9}, variance{0.04f};
+  m.depth = {{"a,b", depth_accuracy({good, variance, {}}, truth, options)},
+             {"c", depth_accuracy({bad, variance, {}}, truth, options)}};
+  m.opacity_reliability.emplace();
+  m.opacity_reliability->add(0.95, true);
+  m.surfaces = {{"points", surface_accuracy({1, 2}, {1, 1, 3, 4}, {1, 2})}};
+  m.volume = volume_accuracy({1, 0.5f, 0.25f, 0.75f}, {0, 2, 4, 30}, {0.5});
+  m.images = {{"a,b", image_quality(Image(12, 12, 3, 0.5f), Image(12, 12, 3, 0.4f), {}), {}}};
+  m.color = color_accuracy({{{0.5f, 0.4f, 0.3f}, {0.4f, 0.4f, 0.4f}}});
+  return m;
+}
+
+TEST(RunMeasures, JsonHasEveryPart) {
+  const auto json = to_json(some_measures());
+  EXPECT_NEAR(json["box_diagonal"].get<double>(), 13, 1e-12);
+  EXPECT_EQ(json["depth"]["share_within_voxels"]["0.5"], 0.5);
+  EXPECT_EQ(json["depth"]["share_within_units"]["0.3"], 0.5);
+  EXPECT_EQ(json["depth"]["views"].size(), 2);
+  EXPECT_EQ(json["calibration"]["coverage_68"], 0.5);
+  EXPECT_EQ(json["calibration"]["opacity"]["bins"][19]["share_with_surface"], 1);
+  EXPECT_EQ(json["surfaces"][0]["within"][1]["precision"], 1);
+  EXPECT_EQ(json["surfaces"][0]["within"][1]["recall"], 0.5);
+  EXPECT_EQ(json["volume"]["share_within_4_voxels"], 0.75);
+  EXPECT_EQ(json["volume"]["histogram"]["voxels"][4], 1);
+  EXPECT_NEAR(json["images"]["object"]["g"]["rms"].get<double>(), 0.1, 1e-6);
+  EXPECT_EQ(json["color"]["pixels"], 1);
+  EXPECT_TRUE(json["held_out"].is_null());
+}
+
+TEST(RunMeasures, WhatWasNotMeasuredIsNull) {
+  const RunMeasures none;
+  EXPECT_TRUE(none.empty());
+  const auto json = to_json(none);
+  for (const char* key : {"depth", "calibration", "volume", "images", "held_out", "color"})
+    EXPECT_TRUE(json[key].is_null()) << key;
+  EXPECT_TRUE(csv_tables(none).empty());
+  EXPECT_EQ(to_text(none), "");
+  EXPECT_TRUE(measure_plots(none).empty());
+}
+
+TEST(RunMeasures, TablesHaveAHeadAndALineEach) {
+  for (const auto& [name, table] : csv_tables(some_measures())) {
+    const auto commas = [](const std::string& line) {
+      bool quoted = false;
+      int count = 0;
+      for (const char c : line) {
+        quoted = quoted != (c == '"');
+        count += c == ',' && !quoted;
+      }
+      return count;
+    };
+    std::size_t begin = 0, end = 0;
+    int expected = -1, lines = 0;
+    for (; (end = table.find('\n', begin)) != std::string::npos; begin = end + 1, ++lines) {
+      const std::string line = table.substr(begin, end - begin);
+      if (expected < 0) expected = commas(line);
+      EXPECT_EQ(commas(line), expected) << name << ": " << line;
+    }
+    EXPECT_GT(lines, 1) << name;
+    EXPECT_EQ(begin, table.size()) << name;
+  }
+}
+
+TEST(RunMeasures, ACommaInANameIsQuoted) {
+  EXPECT_THAT(csv_tables(some_measures())[0].second, HasSubstr("\n\"a,b\",1,1,"));
+}
+
+TEST(RunMeasures, TextIsShortWhereViewsAreMany) {
+  const RunMeasures m = some_measures();
+  EXPECT_THAT(to_text(m), HasSubstr("| c | 1 |"));
+  EXPECT_THAT(to_text(m, 1), Not(HasSubstr("| c | 1 |")));
+  EXPECT_THAT(to_text(m, 1), HasSubstr("| **all** | 2 | 50.00 |"));
+  EXPECT_THAT(to_text(m), HasSubstr("| points | 2 | 2 | 1 | 50.00 | 50.00 | 0.5000 |"));
+}
+
+TEST(MeasurePlots, OneForEachPart) {
+  std::vector<std::string> names;
+  for (const NamedPlot& plot : measure_plots(some_measures())) {
+    names.push_back(plot.name);
+    EXPECT_THAT(svg_plot(plot.plot), Not(HasSubstr("nan")));
+  }
+  EXPECT_THAT(names, testing::ElementsAre("surface_1", "voxel_distances", "voxel_opacities",
+                                          "depth_error_over_sigma", "opacity_reliability", "images"));
+}
+
+TEST(MeasurePlots, HonestErrorsFillTheirCurve) {
+  RunMeasures m;
+  DepthAccuracy all;
+  all.calibrated_pixels = 1000;
+  all.normalized_errors[0] = 500;  // half below 1/25 sigma, half near 0.3: bars of 0.2 sigma
+  all.normalized_errors[7] = 500;
+  m.depth = {{"a", all}};
+  const PlotSeries bars = measure_plots(m)[0].plot.series[0];
+  EXPECT_NEAR(bars.y[0], 2.5, 1e-12);
+  EXPECT_NEAR(bars.y[1], 2.5, 1e-12);
+  EXPECT_EQ(bars.y[2], 0);
+}
+
+}  // namespace
+}  // namespace roxel

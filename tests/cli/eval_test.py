@@ -1,0 +1,323 @@
+#!/usr/bin/env python3
+"""Tests of `roxel eval` and of the report's page, through the program itself, on tiny synthetic data sets.
+
+    eval_test.py ROXEL [unittest arguments, e.g. Measures]
+"""
+
+import html
+import json
+import os
+import pathlib
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import unittest
+
+import cli_test
+from cli_test import TINY, digest, files_below
+
+# A box of two units a side about the middle of the demo's world: corners, and faces as squares.
+CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-0.7, 1.3)]
+SQUARES = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+
+
+def ply(corners=CORNERS, squares=SQUARES):
+    text = f"ply\nformat ascii 1.0\nelement vertex {len(corners)}\n"
+    text += "".join(f"property float {axis}\n" for axis in "xyz")
+    text += f"element face {len(squares)}\nproperty list uchar int vertex_indices\nend_header\n"
+    text += "".join("%g %g %g\n" % corner for corner in corners)
+    return text + "".join("4 %d %d %d %d\n" % square for square in squares)
+
+
+class EvalCase(cli_test.Case):
+    """A run with its data set, and a truth that has a mesh alone."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.run_folder = cls.folder / "run"
+        done = cli_test.run("reconstruct", cls.data, "-o", cls.run_folder, *TINY, "--passes", "4", "--bounds=-1.5,-1.5,-1.2,1.5,1.5,1.8")
+        assert done.returncode == 0, done.stderr
+        cls.mesh = cls.folder / "mesh"
+        cls.mesh.mkdir()
+        (cls.mesh / "mesh.ply").write_text(ply())
+
+    def measures(self, *arguments, run=None):
+        return json.loads(self.succeed("eval", run or self.run_folder, *arguments, "--json").stdout)
+
+
+class Measures(EvalCase):
+    def test_everything_is_measured_where_there_is_truth(self):
+        truth = self.folder / "full"
+        shutil.copytree(self.data, truth)
+        shutil.copy(self.mesh / "mesh.ply", truth)
+        out = self.folder / "metrics"
+        text = self.succeed("eval", self.run_folder, "--truth", truth, "-o", out).stdout
+        for part in ("within 0.5", "depth points that 2 views agree on", "weighted mean opacity", "SSIM", "1 sigma"):
+            self.assertIn(part, text)
+        found = json.loads((out / "metrics.json").read_text())
+        self.assertEqual([s["name"] for s in found["surfaces"]],
+                         ["depth points", "depth points that 2 views agree on", "voxels"])
+        self.assertTrue(0 < found["volume"]["share_within_4_voxels"] <= 1)
+        self.assertTrue(0 < found["volume"]["weighted_mean_opacity"] < 1)
+        self.assertEqual(len(found["images"]["views"]), 4)
+        # Over the same pixels as the run's own figure, but for rounding to 8 bits.
+        self.assertAlmostEqual(100 * found["images"]["object"]["rms"], found["reprojection_rms_percent"], delta=0.3)
+        self.assertGreater(found["images"]["object"]["psnr_db"], 8)
+        self.assertTrue(0 < found["images"]["all"]["ssim"] < 1)
+        bins = found["calibration"]["opacity"]["bins"]
+        self.assertEqual(sum(b["pixels"] for b in bins), 4 * 64 * 48)
+        names = files_below(out)
+        for name in ("metrics.json", "depth.csv", "surfaces.csv", "voxel_distances.csv", "images.csv", "opacity_reliability.csv",
+                     "surface_1.svg", "voxel_distances.svg", "section_x.svg", "section_z.svg", "report.html"):
+            self.assertIn(name, names)
+        self.assertIn("#e00000", (out / "section_z.svg").read_text())
+        page = (out / "report.html").read_text()
+        self.assertIn("Against the truth", page)
+
+    def test_truth_against_itself_is_perfect(self):
+        found = self.measures("--truth", self.mesh, "--estimate", self.mesh / "mesh.ply", "--distances", "0.001,1")
+        estimate = found["surfaces"][-1]
+        self.assertEqual(estimate["name"], "mesh.ply")
+        self.assertEqual([w["f_score"] for w in estimate["within"]], [1, 1])
+        self.assertIsNone(found["depth"])
+
+    def test_a_scan_is_truth_as_it_is(self):
+        scan = self.folder / "scan"
+        scan.mkdir()
+        (scan / "mesh.ply").write_text(ply(CORNERS, []))
+        found = self.measures("--truth", scan, "--estimate", scan / "mesh.ply")
+        self.assertEqual(found["surface_samples"], len(CORNERS))
+        self.assertEqual(found["surfaces"][-1]["within"][0]["f_score"], 1)
+        self.assertIn("a set of points", found["notes"][0])
+
+    def test_voxels_that_were_written_are_the_voxels_that_are_measured(self):
+        *_, voxels, estimate = self.measures("--truth", self.mesh, "--estimate", self.run_folder / "voxels.ply")["surfaces"]
+        self.assertEqual(estimate["points"], voxels["points"])
+        self.assertAlmostEqual(estimate["mean_to_truth"], voxels["mean_to_truth"], places=5)  # floats in the file
+        self.assertAlmostEqual(estimate["accuracy_90"], voxels["accuracy_90"], places=5)
+
+    def test_what_lies_outside_the_box_is_not_missed(self):
+        whole = self.measures()["depth"]
+        half = self.folder / "half"
+        self.succeed("reconstruct", self.data, "-o", half, *TINY, "--resolution", "64", "--bounds=-1.5,-1.5,-1.2,0,1.5,1.8", "--quiet")
+        found = self.measures(run=half)["depth"]
+        self.assertLess(found["true_pixels"], 0.8 * whole["true_pixels"])
+        self.assertEqual(found["true_pixels"] + found["empty_pixels"], 4 * 64 * 48)
+        self.assertGreater(found["share_found"], 0.5)
+
+    def test_another_run_may_be_the_truth(self):
+        truth = self.folder / "same-run"
+        shutil.copytree(self.run_folder, truth)
+        found = self.measures("--truth", truth)["depth"]
+        # Depth of rays that are hardly opaque is there in the truth, and is left out of the estimate.
+        self.assertEqual(found["share_within_voxels"]["0.5"], found["share_found"])
+        self.assertGreater(found["share_found"], 0.3)
+        self.assertEqual(found["bias_voxels"], 0)
+
+    def test_truth_displaced_is_off_by_as_much(self):
+        moved = self.folder / "moved.ply"
+        top = [(x, y, 1.3) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        (self.folder / "top").mkdir()
+        (self.folder / "top/mesh.ply").write_text(ply(top, [(0, 1, 2, 3)]))
+        moved.write_text(ply([(x, y, z - 0.25) for x, y, z in top], [(0, 1, 2, 3)]))
+        found = self.measures("--truth", self.folder / "top", "--estimate", moved, "--distances", "0.24,0.26")["surfaces"][-1]
+        self.assertAlmostEqual(found["accuracy_90"], 0.25, places=6)
+        self.assertEqual([w["f_score"] for w in found["within"]], [0, 1])
+
+    def test_without_its_photographs_a_run_is_still_measured(self):
+        away = self.folder / "away"
+        run = self.folder / "left-behind"
+        shutil.copytree(self.data, away)
+        self.succeed("reconstruct", away, "-o", run, *TINY, "--quiet")
+        here = self.measures(run=run)
+        away.rename(self.folder / "elsewhere")
+        found = self.measures("--truth", self.data, run=run)
+        self.assertEqual(found["depth"]["true_pixels"], here["depth"]["true_pixels"])
+        self.assertIsNone(found["images"])
+        self.assertIn("--dataset", found["notes"][0])
+        self.assertIn("cameras are not known", self.measures("--truth", self.mesh, run=run)["notes"][1])
+        again = self.measures("--dataset", self.folder / "elsewhere", run=run)
+        self.assertEqual(again["images"], here["images"])
+
+    def test_results_do_not_depend_on_threads(self):
+        seen = []
+        for threads in (1, 3):
+            out = self.folder / f"threads{threads}"
+            self.succeed("eval", self.run_folder, "--truth", self.mesh, "-o", out, "--threads", threads, "--quiet")
+            seen.append({name: digest(out / name) for name in files_below(out)})
+        self.assertEqual(*seen)
+
+
+class Options(EvalCase):
+    # What the line has besides, and a value that must change what is measured.
+    CHANGES = {
+        "truth": ([], ["--truth", "MESH"]),
+        "dataset": ([], ["--dataset", "OTHER"]),
+        "depth-within": ([], ["--depth-within", "0.1,0.5"]),
+        "distances": (["--truth", "MESH"], ["--distances", "0.3"]),
+        "estimate": (["--truth", "MESH"], ["--estimate", "MESH/mesh.ply"]),
+        "opacity-threshold": (["--truth", "MESH"], ["--opacity-threshold", "0.5"]),
+        "views-agree": (["--truth", "MESH"], ["--views-agree", "3"]),
+        "samples": (["--truth", "MESH"], ["--samples", "1000"]),
+        "seed": (["--truth", "MESH"], ["--seed", "2"]),
+    }
+    ELSEWHERE = {"section", "threads", "quiet", "verbose", "json", "config", "help", "output"}
+
+    def line(self, arguments):
+        return [a.replace("MESH", str(self.mesh)).replace("OTHER", str(self.folder / "other")) for a in arguments]
+
+    def test_every_option_changes_something(self):
+        other = self.folder / "other"
+        self.synth(other, 4, "64x48")
+        shutil.copy(other / "images/001.png", other / "images/000.png")
+        known = {}
+        for option, (base, change) in self.CHANGES.items():
+            with self.subTest(option):
+                key = tuple(base)
+                if key not in known:
+                    known[key] = self.measures(*self.line(base))
+                self.assertNotEqual(known[key], self.measures(*self.line(base + change)))
+
+    def test_every_option_has_a_case_and_is_in_the_docs(self):
+        named = set(re.findall(r"^  --(?:no-)?([a-z-]+)", self.succeed("eval", "--help").stdout, re.M))
+        self.assertEqual(named - self.ELSEWHERE, set(self.CHANGES))
+        docs = (cli_test.SOURCE / "docs/evaluation.md").read_text()
+        for option in set(self.CHANGES) | {"section"}:
+            self.assertIn(f"--{option}", docs)
+
+    def test_sections_go_through_the_point(self):
+        out = self.folder / "sections"
+        self.succeed("eval", self.run_folder, "-o", out, "--section", "0.5,0.25,-0.125", "--quiet")
+        for axis, position in (("x", "0.5"), ("y", "0.25"), ("z", "-0.125")):
+            self.assertIn(f"section {axis} = {position}<", (out / f"section_{axis}.svg").read_text())
+
+
+class BadTruth(EvalCase):
+    def test_bad_files_and_values_end_with_code_2(self):
+        bad = self.folder / "bad"
+        bad.mkdir()
+        table = [("not a PLY\n", "expected a PLY file"), (ply()[:-20], "the end of the file"),
+                 (ply().replace("4 0 1 3 2", "4 0 1 3 99"), "vertex 99"), (ply().replace("-1 -1 -0.7", "-1 nan -0.7"), "mesh.ply:10: y"),
+                 ("", "mesh.ply")]
+        for text, message in table:
+            with self.subTest(message):
+                (bad / "mesh.ply").write_text(text)
+                self.expect_error(2, message, "eval", self.run_folder, "--truth", bad)
+                self.expect_error(2, message, "eval", self.run_folder, "--truth", self.mesh, "--estimate", bad / "mesh.ply")
+        self.expect_error(2, "--distances: found", "eval", self.run_folder, "--distances", "0.1,-1")
+        self.expect_error(2, "--depth-within: found", "eval", self.run_folder, "--depth-within", "1;2")
+        self.expect_error(2, "no true surface", "eval", self.run_folder, "--estimate", self.mesh / "mesh.ply")
+        self.expect_error(2, "missing.ply", "eval", self.run_folder, "--truth", self.mesh, "--estimate", bad / "missing.ply")
+        self.expect_error(2, "nowhere", "eval", self.run_folder, "--dataset", self.folder / "nowhere")
+
+    def test_a_full_disc_leaves_older_measures(self):
+        out = self.folder / "older"
+        self.succeed("eval", self.run_folder, "-o", out, "--quiet")
+        before = cli_test.digests(out)
+        most_bytes = (out / "report.html").stat().st_size // 2
+        done = cli_test.run_on_a_full_disc("eval", self.run_folder, "--truth", self.mesh, "-o", out, most_bytes=most_bytes)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(cli_test.digests(out), before)
+        self.assertFalse((out / ".partial").exists())
+
+    def test_truth_of_another_size_is_refused(self):
+        small = self.folder / "small"
+        self.synth(small, 4, "32x24")
+        self.expect_error(2, "32 x 24 pixels, expected 64 x 48", "eval", self.run_folder, "--truth", small)
+
+
+class HeldOut(EvalCase):
+    def test_views_of_the_test_split_are_rendered_and_compared(self):
+        data = self.folder / "split"
+        self.synth(data, 6, "64x48")
+        cameras = json.loads((data / "transforms.json").read_text())
+        shutil.rmtree(data / "sparse")
+        frames = cameras["frames"]
+        (data / "transforms.json").write_text(json.dumps({**cameras, "frames": frames[:4]}))
+        (data / "transforms_test.json").write_text(json.dumps({**cameras, "frames": frames[4:]}))
+        run = self.folder / "split-run"
+        self.succeed("reconstruct", data, "-o", run, *TINY, "--quiet")
+        found = self.measures(run=run)
+        self.assertEqual(len(found["images"]["views"]), 4)
+        self.assertEqual([v["name"] for v in found["held_out"]["views"]], ["004", "005"])
+        self.assertTrue(0.01 < found["held_out"]["object"]["rms"] < 0.5)
+        # Held-out views that were seen are the run's own renders.
+        (data / "transforms_test.json").write_text(json.dumps({**cameras, "frames": frames[:4]}))
+        again = self.measures(run=run)
+        self.assertAlmostEqual(again["held_out"]["all"]["rms"], again["images"]["all"]["rms"], places=3)
+
+
+CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
+
+# Holds a page in a frame of a phone's or a desk's width, and writes down what the browser made of it.
+PROBE = """<!DOCTYPE html><html><body><iframe id="page" style="width:%dpx;height:900px;border:0" srcdoc="%s"></iframe>
+<pre id="found"></pre><script>
+onload = () => {
+  const page = document.getElementById("page").contentDocument;
+  const images = [...page.images];
+  document.getElementById("found").textContent = JSON.stringify({
+    width: page.documentElement.clientWidth, needed: page.documentElement.scrollWidth,
+    images: images.length, broken: images.filter(i => !i.complete || i.naturalWidth == 0).length,
+    plots: page.querySelectorAll(".plots svg").length, sections: page.querySelectorAll(".sections svg").length,
+    columns: getComputedStyle(page.querySelector(".view .row")).gridTemplateColumns.split(" ").length});
+};
+</script></body></html>"""
+
+
+def browse(*arguments):
+    return subprocess.run([CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
+                           "--host-resolver-rules=MAP * ~NOTFOUND", *map(str, arguments)],
+                          capture_output=True, timeout=120)
+
+
+@unittest.skipUnless(CHROMIUM, "no Chromium is installed: the report's page is not looked at")
+class Report(EvalCase):
+    def pages(self):
+        out = self.folder / "metrics"
+        self.succeed("eval", self.run_folder, "-o", out, "--quiet")
+        return {"run": self.run_folder / "report.html", "eval": out / "report.html"}
+
+    def probe(self, page, width):
+        file = self.folder / "probe.html"
+        file.write_text(PROBE % (width, html.escape(page.read_text(), quote=True)))
+        shown = browse("--virtual-time-budget=5000", "--dump-dom", file.as_uri()).stdout.decode()
+        return json.loads(html.unescape(re.search(r'<pre id="found">(.*?)</pre>', shown, re.S)[1]))
+
+    def test_the_page_fits_a_phone_and_a_desk(self):
+        for name, page in self.pages().items():
+            for width, columns in ((360, 6), (1200, None)):
+                with self.subTest(f"{name} at {width}"):
+                    found = self.probe(page, width)
+                    self.assertEqual(found["width"], width)
+                    self.assertLessEqual(found["needed"], width, "it scrolls sideways")
+                    pictures = 6 if name == "eval" else 5  # and the error of depth
+                    self.assertEqual((found["images"], found["broken"]), (4 * pictures, 0))
+                    self.assertEqual(found["columns"], columns or pictures)
+                    self.assertEqual(found["sections"], 3)
+                    self.assertGreaterEqual(found["plots"], 5)
+
+    def test_it_is_drawn_and_printed(self):
+        page = self.pages()["eval"]
+        shot, paper = self.folder / "page.png", self.folder / "page.pdf"
+        browse("--window-size=1000,1400", f"--screenshot={shot}", page.as_uri())
+        self.assertEqual(struct.unpack(">II", shot.read_bytes()[16:24]), (1000, 1400))
+        self.assertGreater(shot.stat().st_size, 30000, "hardly anything is on it")
+        browse("--no-pdf-header-footer", f"--print-to-pdf={paper}", page.as_uri())
+        self.assertTrue(paper.read_bytes().startswith(b"%PDF"))
+
+
+def main():
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    if not CHROMIUM:
+        print("SKIPPED: no Chromium is installed, so nobody looks at the report's page", file=sys.stderr)
+    cli_test.ROXEL = os.path.abspath(sys.argv.pop(1))
+    cli_test.SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+    unittest.main(argv=[sys.argv[0], *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()
