@@ -1,0 +1,1 @@
+#include "roxel/sky/sun_position.h"

@@ -1,0 +1,146 @@
+#include "roxel/synth/path_renderer.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "roxel/base/error.h"
+#include "roxel/synth/sample_stream.h"
+
+namespace roxel {
+namespace {
+
+using Eigen::Vector2f;
+using Eigen::Vector3f;
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+void frame_about(const Vector3f& w, Vector3f& u, Vector3f& v) {
+  u = (std::abs(w.x()) < 0.7f ? Vector3f::UnitX() : Vector3f::UnitY()).cross(w).normalized();
+  v = w.cross(u);
+}
+
+Vector2f on_disc(const Vector2f& random) {
+  const float radius = std::sqrt(random.x()), turn = 2 * kPi * random.y();
+  return {radius * std::cos(turn), radius * std::sin(turn)};
+}
+
+/// A direction about the normal with density cos / pi: that of light on a diffuse surface.
+Vector3f diffuse_direction(const Vector3f& normal, const Vector2f& random) {
+  Vector3f u, v;
+  frame_about(normal, u, v);
+  const Vector2f d = on_disc(random);
+  return d.x() * u + d.y() * v + std::sqrt(std::max(1 - d.squaredNorm(), 0.0f)) * normal;
+}
+
+/// Where a new ray starts: off the surface by more than rounding moves the point.
+Vector3f above(const Vector3f& p, const Vector3f& normal) {
+  return p + (2e-6f * p.cwiseAbs().maxCoeff() + 2e-5f) * normal;
+}
+
+std::uint8_t share(int count, int total) {
+  return static_cast<std::uint8_t>(std::lround(255.0 * count / total));
+}
+
+}  // namespace
+
+/// The random numbers of one pixel: even ones for the first light that is looked for, plain ones beyond.
+struct PathRenderer::PixelSamples {
+  SampleStream stream{0, 0, 0, 0};
+  std::vector<Vector2f> sun, sky;
+};
+
+PathRenderer::PathRenderer(const RayScene& everything, const RayScene& lasting,
+                           const std::vector<Texture>& materials, const Environment& environment,
+                           const PathOptions& options)
+    : everything_(everything),
+      lasting_(lasting),
+      materials_(materials),
+      environment_(environment),
+      options_(options) {
+  ROXEL_CHECK_GE(options.samples, 1);
+  ROXEL_CHECK_GE(options.bounces, 0);
+  frame_about(environment.sun().direction, sun_u_, sun_v_);
+}
+
+// Radiance over pi is what a white surface reflects; the caller multiplies by albedo.
+Vector3f PathRenderer::sunlight(const Vector3f& p, const Vector3f& normal, const Vector2f& random) const {
+  const Sun& sun = environment_.sun();
+  if (sun.irradiance.isZero()) return Vector3f::Zero();
+  const Vector2f d = std::tan(sun.angular_radius_rad) * on_disc(random);
+  const Vector3f to_sun = (sun.direction + d.x() * sun_u_ + d.y() * sun_v_).normalized();
+  const float facing = normal.dot(to_sun);
+  if (facing <= 0 || everything_.occluded(p, to_sun, 0, std::numeric_limits<float>::infinity()))
+    return Vector3f::Zero();
+  return (facing / kPi) * sun.irradiance;
+}
+
+// A path goes on in a direction of diffuse reflection; where it leaves the world it has found the sky, and
+// at every surface it looks for the sun. What would be reflected more often is left out.
+Vector3f PathRenderer::reflected(Vector3f from, Vector3f direction, RayHit hit, int k, PixelSamples& samples) const {
+  Vector3f light = Vector3f::Zero(), throughput = Vector3f::Ones();
+  for (int bounce = 0;; ++bounce) {
+    const Vector3f p = from + hit.distance * direction;
+    throughput = throughput.cwiseProduct(materials_[hit.material](p, hit.normal));
+    from = above(p, hit.normal);
+    const bool first = bounce == 0;
+    light += throughput.cwiseProduct(sunlight(from, hit.normal, first ? samples.sun[k] : samples.stream.pair()));
+    direction = diffuse_direction(hit.normal, first ? samples.sky[k] : samples.stream.pair());
+    const auto next = everything_.trace(from, direction);
+    if (!next) return light + throughput.cwiseProduct(environment_.sky(direction));
+    if (bounce == options_.bounces) return light;
+    hit = *next;
+  }
+}
+
+void PathRenderer::shade_pixel(const PinholeCamera& camera, int x, int y, PixelSamples& samples,
+                               Picture& picture) const {
+  const int count = options_.samples;
+  samples.stream.even_pairs(count, samples.sun);
+  samples.stream.even_pairs(count, samples.sky);
+  Vector3f sum = Vector3f::Zero();
+  int hits = 0, extra_hits = 0;
+  for (int k = 0; k < count; ++k) {
+    const Vector2f at = even_point(k);
+    const Ray ray = camera.ray(x + at.x(), y + at.y());
+    const Vector3f origin = ray.origin.cast<float>(), direction = ray.direction.normalized().cast<float>();
+    const auto hit = everything_.trace(origin, direction);
+    hits += hit.has_value();
+    extra_hits += hit && hit->extra;
+    if (hit)
+      sum += reflected(origin, direction, *hit, k, samples);
+    else if (options_.environment_seen)
+      sum += environment_.seen(direction);
+  }
+  Eigen::Map<Vector3f>(picture.rgb.pixel(x, y)) = sum / static_cast<float>(count);
+  picture.mask.at(x, y) = share(hits, count);
+  picture.transient.at(x, y) = share(extra_hits, count);
+}
+
+void PathRenderer::measure_pixel(const PinholeCamera& camera, int x, int y, Picture& picture) const {
+  const Ray ray = camera.ray(x + 0.5, y + 0.5);
+  const Vector3f origin = ray.origin.cast<float>(), direction = ray.direction.cast<float>();
+  const auto hit = lasting_.trace(origin, direction);
+  if (!hit) return;
+  *picture.depth.pixel(x, y) = hit->distance;
+  Eigen::Map<Vector3f>(picture.normal.pixel(x, y)) = hit->normal;
+  Eigen::Map<Vector3f>(picture.albedo.pixel(x, y)) =
+      materials_[hit->material](origin + hit->distance * direction, hit->normal);
+}
+
+Picture PathRenderer::render(const PinholeCamera& camera, int image, const RunContext& context) const {
+  const int width = camera.intrinsics.width, height = camera.intrinsics.height;
+  Picture picture{Image(width, height, 3), Image(width, height, 1), Image(width, height, 3),
+                  Image(width, height, 3), Mask(width, height, 0),  Mask(width, height, 0)};
+  PixelSamples samples;
+  for (int y = 0; y < height; ++y) {
+    context.throw_if_cancelled();
+    for (int x = 0; x < width; ++x) {
+      samples.stream = SampleStream(x, y, image, options_.seed);
+      shade_pixel(camera, x, y, samples, picture);
+      measure_pixel(camera, x, y, picture);
+    }
+  }
+  return picture;
+}
+
+}  // namespace roxel

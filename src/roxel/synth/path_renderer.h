@@ -1,0 +1,61 @@
+#pragma once
+/// Photographs of triangle meshes with diffuse materials by path tracing, and the truth about each pixel.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "roxel/base/run_context.h"
+#include "roxel/camera/camera.h"
+#include "roxel/image/image.h"
+#include "roxel/synth/environment.h"
+#include "roxel/synth/ray_scene.h"
+#include "roxel/synth/texture.h"
+
+namespace roxel {
+
+/// Depth, albedo and normal are those of what stands for good along the ray through the pixel's centre.
+struct Picture {
+  Image rgb;       ///< linear radiance, averaged over the pixel's samples
+  Image depth;     ///< one channel: distance along the optical axis, 0 = no surface
+  Image albedo;    ///< 0 where there is no surface
+  Image normal;    ///< in world coordinates, towards the camera; 0 where there is no surface
+  Mask mask;       ///< share of the pixel's samples that met a surface, 0 to 255
+  Mask transient;  ///< share of the pixel's samples that met what stands here for a while
+};
+
+struct PathOptions {
+  int samples = 16;              ///< rays a pixel, at least 1
+  int bounces = 2;               ///< diffuse reflections of light that is not the sun's or sky's own, at least 0
+  bool environment_seen = true;  ///< whether cameras see the sky; black otherwise
+  std::uint32_t seed = 1;
+};
+
+class PathRenderer {
+ public:
+  /// `everything` is what light meets, `lasting` what depth is taken from; they may be one. All arguments
+  /// must outlive the renderer.
+  PathRenderer(const RayScene& everything, const RayScene& lasting, const std::vector<Texture>& materials,
+               const Environment& environment, const PathOptions& options);
+
+  /// On the calling thread; throws Cancelled within a row of pixels. `image` seeds the samples.
+  Picture render(const PinholeCamera& camera, int image, const RunContext& context) const;
+
+ private:
+  struct PixelSamples;
+  void shade_pixel(const PinholeCamera& camera, int x, int y, PixelSamples& samples, Picture& picture) const;
+  void measure_pixel(const PinholeCamera& camera, int x, int y, Picture& picture) const;
+  Eigen::Vector3f reflected(Eigen::Vector3f from, Eigen::Vector3f direction, RayHit hit, int k,
+                            PixelSamples& samples) const;
+  Eigen::Vector3f sunlight(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
+                           const Eigen::Vector2f& random) const;
+
+  const RayScene& everything_;
+  const RayScene& lasting_;
+  const std::vector<Texture>& materials_;
+  const Environment& environment_;
+  PathOptions options_;
+  Eigen::Vector3f sun_u_, sun_v_;  ///< across the direction to the sun
+};
+
+}  // namespace roxel
