@@ -125,13 +125,16 @@ Environment daylight(const Vector3f& to_sun, const Weather& weather) {
   return Environment(radiance, sun);
 }
 
-Environment studio() {
+Environment studio(const Vector3f& to_lamp, float surround) {
   Sun lamp;
-  lamp.direction = Vector3f(-0.45f, -0.65f, 0.62f).normalized();
+  lamp.direction = to_lamp.normalized();
   lamp.irradiance = kPi * Vector3f(0.52f, 0.50f, 0.47f);
   lamp.angular_radius_rad = 0.12f;
   return Environment(
-      [](const Vector3f& d) { return Vector3f((0.40f + 0.16f * d.z()) * Vector3f(0.97f, 1.0f, 1.03f)); }, lamp);
+      [&](const Vector3f& d) {
+        return Vector3f(surround * (0.40f + 0.16f * d.z()) * Vector3f(0.97f, 1.0f, 1.03f));
+      },
+      lamp);
 }
 
 Lights make_lights(const World& world, const LightPlan& plan, int threads) {
@@ -140,7 +143,7 @@ Lights make_lights(const World& world, const LightPlan& plan, int threads) {
   const bool one = plan.kind == LightKind::kConstant;
   for (int i = 0; i < occasions; ++i) lights.of_occasion.push_back(one ? 0 : i);
   if (one && !world.outdoors) {
-    lights.all.push_back({"n00", studio()});
+    lights.all.push_back({"n00", studio(world.lamp_direction, world.surround)});
     return lights;
   }
   std::vector<std::unique_ptr<Light>> made(one ? 1 : occasions);

@@ -26,7 +26,7 @@ std::string to_string(Weather::Kind kind);
 Environment daylight(const Eigen::Vector3f& to_sun, const Weather& weather);
 /// A large lamp and a surround that is brighter above: a white surface that faces the lamp has radiance of
 /// about 1.
-Environment studio();
+Environment studio(const Eigen::Vector3f& to_lamp, float surround = 1);
 
 struct Light {
   std::string name;  ///< of its files: "n00", "n01", ...

@@ -74,6 +74,18 @@ Vector3f PathRenderer::sunlight(const Vector3f& p, const Vector3f& normal, const
   return (facing / kPi) * sun.irradiance;
 }
 
+// An even point of the opening stands for all of it: its radiance times solid angle a unit of area.
+Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& normal, const Vector2f& random) const {
+  const Skylight& opening = *options_.skylight;
+  const Vector2f at = opening.extent.min() + opening.extent.sizes().cwiseProduct(random);
+  const Vector3f way(at.x() - p.x(), at.y() - p.y(), opening.height - p.z());
+  const float squared = way.squaredNorm(), distance = std::sqrt(squared);
+  const float facing = normal.dot(way) / distance;
+  if (facing <= 0 || way.z() <= 0 || everything_.occluded(p, way, 0, 1)) return Vector3f::Zero();
+  const float solid_angle = opening.extent.volume() * (way.z() / distance) / squared;
+  return facing * solid_angle / kPi * environment_.sky(way / distance);
+}
+
 // A path goes on in a direction of diffuse reflection; where it leaves the world it has found the sky, and
 // at every surface it looks for the sun. What would be reflected more often is left out.
 Vector3f PathRenderer::reflected(Vector3f from, Vector3f direction, RayHit hit, int k, PixelSamples& samples) const {
@@ -84,8 +96,14 @@ Vector3f PathRenderer::reflected(Vector3f from, Vector3f direction, RayHit hit, 
     from = above(p, hit.normal);
     const bool first = bounce == 0;
     light += throughput.cwiseProduct(sunlight(from, hit.normal, first ? samples.sun[k] : samples.stream.pair()));
-    direction = diffuse_direction(hit.normal, first ? samples.sky[k] : samples.stream.pair());
+    // Where the opening is looked for, paths that leave through it have been counted. Further on they are
+    // not: points close under the opening would shine as single bright pixels.
+    const bool look_up = first && options_.skylight;
+    const Vector2f sky = first ? samples.sky[k] : samples.stream.pair();
+    if (look_up) light += throughput.cwiseProduct(light_from_above(from, hit.normal, sky));
+    direction = diffuse_direction(hit.normal, look_up ? samples.stream.pair() : sky);
     const auto next = everything_.trace(from, direction);
+    if (!next && look_up) return light;
     if (!next) return light + throughput.cwiseProduct(environment_.sky(direction));
     if (bounce == options_.bounces) return light;
     hit = *next;

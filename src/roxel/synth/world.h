@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "roxel/camera/camera.h"
+#include "roxel/synth/path_renderer.h"
 #include "roxel/synth/texture.h"
 #include "roxel/synth/triangle_mesh.h"
 
@@ -48,6 +49,9 @@ struct World {
   std::vector<UtcSeconds> times_utc_s;  ///< of each occasion: a time at which one or more shots are taken
   bool occasions_are_nodes = false;     ///< shots of one occasion have one optical centre
   bool outdoors = false;                ///< constant light is a clear noon instead of a studio
+  Eigen::Vector3f lamp_direction = {-0.45f, -0.65f, 0.62f};  ///< to the studio's lamp, any length
+  float surround = 1;                 ///< brightness of the studio's surround
+  std::optional<Skylight> skylight = {};
   bool environment_seen = true;         ///< cameras see the sky where nothing stands; else black
   bool masked = true;                   ///< masks belong to the data set
   bool high_dynamic_range = false;      ///< photographs are radiance in EXR files, not 8-bit PNG

@@ -71,6 +71,7 @@ Stage set_stage(WorldKind kind, const WorldRequest& request, const SynthOptions&
         stage.world.mesh, make_transients(stage.world, i, options.transients, options.seed)));
   stage.path.samples = options.samples.value_or(world_defaults(kind).samples);
   stage.path.environment_seen = stage.world.environment_seen;
+  stage.path.skylight = stage.world.skylight;
   stage.path.seed = options.seed;
   return stage;
 }
