@@ -38,7 +38,7 @@ double way_out(double height, double mu) {
 double way_down(double height, double mu) {
   const double r = kGround + height, inside = r * r * (mu * mu - 1) + kGround * kGround;
   if (mu >= 0 || inside < 0) return -1;
-  return -r * mu - std::sqrt(inside);
+  return std::max(0.0, -r * mu - std::sqrt(inside));
 }
 
 struct Place {
@@ -100,7 +100,7 @@ Atmosphere::Medium Atmosphere::medium(double height) const {
 }
 
 Vector3d Atmosphere::march_transmittance(double height, double mu) const {
-  if (way_down(height, mu) > 0) return Vector3d::Zero();
+  if (way_down(height, mu) >= 0) return Vector3d::Zero();
   constexpr int kSteps = 96;
   const double way = way_out(height, mu);
   Vector3d depth = Vector3d::Zero();
@@ -135,7 +135,7 @@ void Atmosphere::march_multiple(double height, double mu_sun, Vector3d& once, Ve
       const double mu = 2 * (row + 0.5) / kRows - 1, azimuth = 2 * kPi * (turn + 0.5) / kTurns;
       const double view_dot_sun =
           mu * mu_sun + std::sqrt((1 - mu * mu) * std::max(0.0, 1 - mu_sun * mu_sun)) * std::cos(azimuth);
-      const double down = way_down(height, mu), way = down > 0 ? down : way_out(height, mu);
+      const double down = way_down(height, mu), way = down >= 0 ? down : way_out(height, mu);
       Vector3d clear = Vector3d::Ones();
       for (int i = 0; i < kSteps; ++i) {
         const double from = way * i * i / (kSteps * kSteps), to = way * (i + 1) * (i + 1) / (kSteps * kSteps);

@@ -32,11 +32,12 @@ Vector3f in_layer(const Vector3f& d) {
   return {2.5f * d.x() / z, 2.5f * d.y() / z, 0};
 }
 
-/// Opacity of scattered clouds, 0 to 1.
-float cloud_opacity(const Vector3f& d, const Weather& weather) {
+/// Opacity of scattered clouds, 0 to 1. The sun stands in a gap between them.
+float cloud_opacity(const Vector3f& d, const Vector3f& to_sun, const Weather& weather) {
+  const float gap = ramp(0.06f, 0.3f, (d - to_sun).norm());
   const float noise = fractal_noise(in_layer(d), 6, weather.seed);
   const float threshold = 0.45f * (1 - 2 * static_cast<float>(weather.cloud_cover));
-  return ramp(threshold, threshold + 0.18f, noise) * ramp(0.0f, 0.06f, d.z());
+  return ramp(threshold, threshold + 0.18f, noise) * ramp(0.0f, 0.06f, d.z()) * gap;
 }
 
 /// Light on horizontal ground under a clear sky, by the light of a few rings of directions.
@@ -108,7 +109,6 @@ Environment daylight(const Vector3f& to_sun, const Weather& weather) {
   Sun sun;
   sun.direction = to_sun;
   if (!overcast) sun.irradiance = kSunOutside * air.transmittance(sun_d.z()).cast<float>();
-  if (clouds) sun.irradiance *= std::exp(-5 * cloud_opacity(to_sun, weather));
 
   const Vector3f ground = kGroundAlbedo / kPi * (overcast ? grey_light : clear_light);
   const auto radiance = [&](const Vector3f& d) -> Vector3f {
@@ -120,7 +120,7 @@ Environment daylight(const Vector3f& to_sun, const Weather& weather) {
     const float glow = 0.55f + 0.9f * std::pow(std::max(d.dot(to_sun), 0.0f), 8.0f);
     const float body = 1 + 0.35f * fractal_noise(3 * in_layer(d), 4, weather.seed + 9);
     const Vector3f cloud = glow * body / kPi * clear_light;
-    return clear + cloud_opacity(d, weather) * (cloud - clear);
+    return clear + cloud_opacity(d, to_sun, weather) * (cloud - clear);
   };
   return Environment(radiance, sun);
 }

@@ -46,7 +46,7 @@ std::uint8_t share(int count, int total) {
 /// The random numbers of one pixel: even ones for the first light that is looked for, plain ones beyond.
 struct PathRenderer::PixelSamples {
   SampleStream stream{0, 0, 0, 0};
-  std::vector<Vector2f> sun, sky;
+  std::vector<Vector2f> sun, sky, around;
 };
 
 PathRenderer::PathRenderer(const RayScene& everything, const RayScene& lasting,
@@ -56,9 +56,14 @@ PathRenderer::PathRenderer(const RayScene& everything, const RayScene& lasting,
       lasting_(lasting),
       materials_(materials),
       environment_(environment),
-      options_(options) {
+      options_(options),
+      sampler_(environment) {
   ROXEL_CHECK_GE(options.samples, 1);
   ROXEL_CHECK_GE(options.bounces, 0);
+  // An even sky is best found by the diffuse directions themselves.
+  constexpr float kPeaked = 8;
+  search_ = options.skylight ? SkySearch::kOpening
+                             : sampler_.peak() > kPeaked ? SkySearch::kBrightParts : SkySearch::kByChance;
   frame_about(environment.sun().direction, sun_u_, sun_v_);
 }
 
@@ -74,7 +79,27 @@ Vector3f PathRenderer::sunlight(const Vector3f& p, const Vector3f& normal, const
   return (facing / kPi) * sun.irradiance;
 }
 
-// An even point of the opening stands for all of it: its radiance times solid angle a unit of area.
+// The sky is found in two ways, by directions that favour its bright parts and by diffuse ones; each light
+// counts by the share that its way has in the density of both (the balance heuristic of [Veach97] 9.2.2).
+Vector3f PathRenderer::skylight(const Vector3f& p, const Vector3f& normal, const Vector2f& random) const {
+  const Vector3f direction = sampler_.direction(random);
+  const float facing = normal.dot(direction);
+  if (facing <= 0 || everything_.occluded(p, direction, 0, std::numeric_limits<float>::infinity()))
+    return Vector3f::Zero();
+  return (facing / kPi) / (sampler_.density(direction) + facing / kPi) * environment_.sky(direction);
+}
+
+/// What a diffuse direction that leaves the world brings.
+Vector3f PathRenderer::sky_found(const Vector3f& direction, float facing) const {
+  const Vector3f sky = environment_.sky(direction);
+  if (search_ == SkySearch::kOpening) return Vector3f::Zero();  // it has been looked for
+  if (search_ == SkySearch::kByChance) return sky;
+  return (facing / kPi) / (sampler_.density(direction) + facing / kPi) * sky;
+}
+
+// An even point of the opening stands for all of it: its radiance times solid angle a unit of area. Close
+// under the opening that would be single bright samples: it is held below a solid angle of a hemisphere's
+// size, which takes a little light from the walls' upper ends.
 Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& normal, const Vector2f& random) const {
   const Skylight& opening = *options_.skylight;
   const Vector2f at = opening.extent.min() + opening.extent.sizes().cwiseProduct(random);
@@ -82,7 +107,7 @@ Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& norma
   const float squared = way.squaredNorm(), distance = std::sqrt(squared);
   const float facing = normal.dot(way) / distance;
   if (facing <= 0 || way.z() <= 0 || everything_.occluded(p, way, 0, 1)) return Vector3f::Zero();
-  const float solid_angle = opening.extent.volume() * (way.z() / distance) / squared;
+  const float solid_angle = std::min(opening.extent.volume() * (way.z() / distance) / squared, 2 * kPi);
   return facing * solid_angle / kPi * environment_.sky(way / distance);
 }
 
@@ -96,15 +121,13 @@ Vector3f PathRenderer::reflected(Vector3f from, Vector3f direction, RayHit hit, 
     from = above(p, hit.normal);
     const bool first = bounce == 0;
     light += throughput.cwiseProduct(sunlight(from, hit.normal, first ? samples.sun[k] : samples.stream.pair()));
-    // Where the opening is looked for, paths that leave through it have been counted. Further on they are
-    // not: points close under the opening would shine as single bright pixels.
-    const bool look_up = first && options_.skylight;
     const Vector2f sky = first ? samples.sky[k] : samples.stream.pair();
-    if (look_up) light += throughput.cwiseProduct(light_from_above(from, hit.normal, sky));
-    direction = diffuse_direction(hit.normal, look_up ? samples.stream.pair() : sky);
+    if (search_ == SkySearch::kOpening) light += throughput.cwiseProduct(light_from_above(from, hit.normal, sky));
+    if (search_ == SkySearch::kBrightParts) light += throughput.cwiseProduct(skylight(from, hit.normal, sky));
+    direction = diffuse_direction(
+        hit.normal, search_ == SkySearch::kByChance ? sky : first ? samples.around[k] : samples.stream.pair());
     const auto next = everything_.trace(from, direction);
-    if (!next && look_up) return light;
-    if (!next) return light + throughput.cwiseProduct(environment_.sky(direction));
+    if (!next) return light + throughput.cwiseProduct(sky_found(direction, hit.normal.dot(direction)));
     if (bounce == options_.bounces) return light;
     hit = *next;
   }
@@ -115,6 +138,7 @@ void PathRenderer::shade_pixel(const PinholeCamera& camera, int x, int y, PixelS
   const int count = options_.samples;
   samples.stream.even_pairs(count, samples.sun);
   samples.stream.even_pairs(count, samples.sky);
+  samples.stream.even_pairs(count, samples.around);
   Vector3f sum = Vector3f::Zero();
   int hits = 0, extra_hits = 0;
   for (int k = 0; k < count; ++k) {

@@ -12,6 +12,7 @@
 #include "roxel/image/image.h"
 #include "roxel/synth/environment.h"
 #include "roxel/synth/ray_scene.h"
+#include "roxel/synth/sky_sampler.h"
 #include "roxel/synth/texture.h"
 
 namespace roxel {
@@ -59,6 +60,9 @@ class PathRenderer {
                             PixelSamples& samples) const;
   Eigen::Vector3f sunlight(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
                            const Eigen::Vector2f& random) const;
+  Eigen::Vector3f skylight(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
+                           const Eigen::Vector2f& random) const;
+  Eigen::Vector3f sky_found(const Eigen::Vector3f& direction, float facing) const;
   Eigen::Vector3f light_from_above(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
                                    const Eigen::Vector2f& random) const;
 
@@ -67,6 +71,8 @@ class PathRenderer {
   const std::vector<Texture>& materials_;
   const Environment& environment_;
   PathOptions options_;
+  SkySampler sampler_;
+  enum class SkySearch { kByChance, kBrightParts, kOpening } search_;  ///< how paths find the sky
   Eigen::Vector3f sun_u_, sun_v_;  ///< across the direction to the sun
 };
 
