@@ -1,9 +1,11 @@
 #include "roxel/synth/path_renderer.h"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "roxel/base/error.h"
+#include "roxel/synth/light_filter.h"
 #include "roxel/synth/sample_stream.h"
 
 namespace roxel {
@@ -112,76 +114,102 @@ Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& norma
 }
 
 // A path goes on in a direction of diffuse reflection; where it leaves the world it has found the sky, and
-// at every surface it looks for the sun. What would be reflected more often is left out.
-Vector3f PathRenderer::reflected(Vector3f from, Vector3f direction, RayHit hit, int k, PixelSamples& samples) const {
+// at every surface it looks for the sun. What would be reflected more often is left out. `from` lies on the
+// surface that was hit; its own sunlight and albedo are the caller's.
+Vector3f PathRenderer::incoming(Vector3f from, RayHit hit, int k, PixelSamples& samples) const {
   Vector3f light = Vector3f::Zero(), throughput = Vector3f::Ones();
   for (int bounce = 0;; ++bounce) {
-    const Vector3f p = from + hit.distance * direction;
-    throughput = throughput.cwiseProduct(materials_[hit.material](p, hit.normal));
-    from = above(p, hit.normal);
     const bool first = bounce == 0;
-    light += throughput.cwiseProduct(sunlight(from, hit.normal, first ? samples.sun[k] : samples.stream.pair()));
     const Vector2f sky = first ? samples.sky[k] : samples.stream.pair();
     if (search_ == SkySearch::kOpening) light += throughput.cwiseProduct(light_from_above(from, hit.normal, sky));
     if (search_ == SkySearch::kBrightParts) light += throughput.cwiseProduct(skylight(from, hit.normal, sky));
-    direction = diffuse_direction(
+    const Vector3f direction = diffuse_direction(
         hit.normal, search_ == SkySearch::kByChance ? sky : first ? samples.around[k] : samples.stream.pair());
     const auto next = everything_.trace(from, direction);
     if (!next) return light + throughput.cwiseProduct(sky_found(direction, hit.normal.dot(direction)));
     if (bounce == options_.bounces) return light;
     hit = *next;
+    const Vector3f p = from + hit.distance * direction;
+    throughput = throughput.cwiseProduct(materials_[hit.material](p, hit.normal));
+    from = above(p, hit.normal);
+    light += throughput.cwiseProduct(sunlight(from, hit.normal, samples.stream.pair()));
   }
 }
 
-void PathRenderer::shade_pixel(const PinholeCamera& camera, int x, int y, PixelSamples& samples,
-                               Picture& picture) const {
-  const int count = options_.samples;
-  samples.stream.even_pairs(count, samples.sun);
-  samples.stream.even_pairs(count, samples.sky);
-  samples.stream.even_pairs(count, samples.around);
-  Vector3f sum = Vector3f::Zero();
+/// Sums over a pixel's samples.
+struct PathRenderer::PixelLight {
+  Vector3f sharp = Vector3f::Zero();     // the sun's light and the sky behind everything
+  Vector3f albedo = Vector3f::Zero();    // of the surfaces that were hit
+  Vector3f incoming = Vector3f::Zero();  // all other light on them, over pi
   int hits = 0, extra_hits = 0;
+};
+
+PathRenderer::PixelLight PathRenderer::light_of_pixel(const PinholeCamera& camera, int x, int y,
+                                                      PixelSamples& samples) const {
+  const int count = options_.samples;
+  for (auto* pairs : {&samples.sun, &samples.sky, &samples.around}) samples.stream.even_pairs(count, *pairs);
+  PixelLight sum;
   for (int k = 0; k < count; ++k) {
     const Vector2f at = even_point(k);
     const Ray ray = camera.ray(x + at.x(), y + at.y());
     const Vector3f origin = ray.origin.cast<float>(), direction = ray.direction.normalized().cast<float>();
     const auto hit = everything_.trace(origin, direction);
-    hits += hit.has_value();
-    extra_hits += hit && hit->extra;
-    if (hit)
-      sum += reflected(origin, direction, *hit, k, samples);
-    else if (options_.environment_seen)
-      sum += environment_.seen(direction);
+    if (!hit) {
+      if (options_.environment_seen) sum.sharp += environment_.seen(direction);
+      continue;
+    }
+    const Vector3f p = origin + hit->distance * direction, from = above(p, hit->normal);
+    const Vector3f albedo = materials_[hit->material](p, hit->normal);
+    sum.sharp += albedo.cwiseProduct(sunlight(from, hit->normal, samples.sun[k]));
+    sum.albedo += albedo;
+    sum.incoming += incoming(from, *hit, k, samples);
+    ++sum.hits;
+    sum.extra_hits += hit->extra;
   }
-  Eigen::Map<Vector3f>(picture.rgb.pixel(x, y)) = sum / static_cast<float>(count);
-  picture.mask.at(x, y) = share(hits, count);
-  picture.transient.at(x, y) = share(extra_hits, count);
+  return sum;
 }
 
-void PathRenderer::measure_pixel(const PinholeCamera& camera, int x, int y, Picture& picture) const {
+/// What lasts, for the truth; what is there at the moment is returned.
+std::optional<RayHit> PathRenderer::measure_pixel(const PinholeCamera& camera, int x, int y, Picture& picture) const {
   const Ray ray = camera.ray(x + 0.5, y + 0.5);
   const Vector3f origin = ray.origin.cast<float>(), direction = ray.direction.cast<float>();
   const auto hit = lasting_.trace(origin, direction);
-  if (!hit) return;
-  *picture.depth.pixel(x, y) = hit->distance;
-  Eigen::Map<Vector3f>(picture.normal.pixel(x, y)) = hit->normal;
-  Eigen::Map<Vector3f>(picture.albedo.pixel(x, y)) =
-      materials_[hit->material](origin + hit->distance * direction, hit->normal);
+  if (hit) {
+    *picture.depth.pixel(x, y) = hit->distance;
+    Eigen::Map<Vector3f>(picture.normal.pixel(x, y)) = hit->normal;
+    Eigen::Map<Vector3f>(picture.albedo.pixel(x, y)) =
+        materials_[hit->material](origin + hit->distance * direction, hit->normal);
+  }
+  return &lasting_ == &everything_ ? hit : everything_.trace(origin, direction);
 }
 
 Picture PathRenderer::render(const PinholeCamera& camera, int image, const RunContext& context) const {
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;
-  Picture picture{Image(width, height, 3), Image(width, height, 1), Image(width, height, 3),
-                  Image(width, height, 3), Mask(width, height, 0),  Mask(width, height, 0)};
+  const Image grey(width, height, 1), color(width, height, 3);
+  Picture picture{color, grey, color, color, Mask(width, height, 0), Mask(width, height, 0)};
+  Image albedo = color, light = color;
+  SurfaceGuide guide{grey, color};
   PixelSamples samples;
   for (int y = 0; y < height; ++y) {
     context.throw_if_cancelled();
     for (int x = 0; x < width; ++x) {
       samples.stream = SampleStream(x, y, image, options_.seed);
-      shade_pixel(camera, x, y, samples, picture);
-      measure_pixel(camera, x, y, picture);
+      const PixelLight sum = light_of_pixel(camera, x, y, samples);
+      const auto count = static_cast<float>(options_.samples);
+      Eigen::Map<Vector3f>(picture.rgb.pixel(x, y)) = sum.sharp / count;
+      Eigen::Map<Vector3f>(albedo.pixel(x, y)) = sum.albedo / count;
+      Eigen::Map<Vector3f>(light.pixel(x, y)) = sum.incoming / std::max(1.0f, static_cast<float>(sum.hits));
+      picture.mask.at(x, y) = share(sum.hits, options_.samples);
+      picture.transient.at(x, y) = share(sum.extra_hits, options_.samples);
+      if (const auto hit = measure_pixel(camera, x, y, picture)) {
+        *guide.depth.pixel(x, y) = hit->distance;
+        Eigen::Map<Vector3f>(guide.normal.pixel(x, y)) = hit->normal;
+      }
     }
   }
+  light = smoothed_light(std::move(light), guide, camera, options_.smoothing);
+  for (std::size_t i = 0; i < light.data().size(); ++i)
+    picture.rgb.data()[i] += albedo.data()[i] * light.data()[i];
   return picture;
 }
 

@@ -38,6 +38,9 @@ struct PathOptions {
   int samples = 16;              ///< rays a pixel, at least 1
   int bounces = 2;               ///< diffuse reflections of light that is not the sun's or sky's own, at least 0
   bool environment_seen = true;  ///< whether cameras see the sky; black otherwise
+  /// Light of the sky and of other surfaces is smoothed along each surface in so many passes
+  /// (light_filter.h). The sun's own light and its shadows are not.
+  int smoothing = 3;
   std::optional<Skylight> skylight = {};
   std::uint32_t seed = 1;
 };
@@ -54,10 +57,10 @@ class PathRenderer {
 
  private:
   struct PixelSamples;
-  void shade_pixel(const PinholeCamera& camera, int x, int y, PixelSamples& samples, Picture& picture) const;
-  void measure_pixel(const PinholeCamera& camera, int x, int y, Picture& picture) const;
-  Eigen::Vector3f reflected(Eigen::Vector3f from, Eigen::Vector3f direction, RayHit hit, int k,
-                            PixelSamples& samples) const;
+  struct PixelLight;
+  PixelLight light_of_pixel(const PinholeCamera& camera, int x, int y, PixelSamples& samples) const;
+  std::optional<RayHit> measure_pixel(const PinholeCamera& camera, int x, int y, Picture& picture) const;
+  Eigen::Vector3f incoming(Eigen::Vector3f from, RayHit hit, int k, PixelSamples& samples) const;
   Eigen::Vector3f sunlight(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
                            const Eigen::Vector2f& random) const;
   Eigen::Vector3f skylight(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,

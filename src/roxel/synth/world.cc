@@ -16,11 +16,11 @@ struct Entry {
 constexpr int kStreetImages = 14 * 20;
 
 constexpr std::array<Entry, 6> kWorlds = {{
-    {"plane", WorldKind::kPlane, plane_world, {15, 400, 300, LightKind::kConstant, 16}},
-    {"head", WorldKind::kHead, head_world, {20, 400, 300, LightKind::kConstant, 16}},
-    {"mug", WorldKind::kMug, mug_world, {24, 352, 288, LightKind::kConstant, 16}},
-    {"table", WorldKind::kTable, table_world, {24, 640, 480, LightKind::kConstant, 12}},
-    {"street", WorldKind::kStreet, street_world, {160, 324, 256, LightKind::kMix, 9, kStreetImages}},
+    {"plane", WorldKind::kPlane, plane_world, {15, 400, 300, LightKind::kConstant, 12}},
+    {"head", WorldKind::kHead, head_world, {20, 400, 300, LightKind::kConstant, 12}},
+    {"mug", WorldKind::kMug, mug_world, {24, 352, 288, LightKind::kConstant, 12}},
+    {"table", WorldKind::kTable, table_world, {24, 640, 480, LightKind::kConstant, 9}},
+    {"street", WorldKind::kStreet, street_world, {160, 324, 256, LightKind::kMix, 8, kStreetImages}},
     {"flights", WorldKind::kFlights, flights_world, {60, 640, 480, LightKind::kMix, 6}},
 }};
 

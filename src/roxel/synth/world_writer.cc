@@ -70,6 +70,9 @@ Stage set_stage(WorldKind kind, const WorldRequest& request, const SynthOptions&
     stage.at_occasion.push_back(std::make_unique<RayScene>(
         stage.world.mesh, make_transients(stage.world, i, options.transients, options.seed)));
   stage.path.samples = options.samples.value_or(world_defaults(kind).samples);
+  // With so many paths there is little grain left to smooth.
+  constexpr int kPlenty = 64;
+  if (stage.path.samples >= kPlenty) stage.path.smoothing = 0;
   stage.path.environment_seen = stage.world.environment_seen;
   stage.path.skylight = stage.world.skylight;
   stage.path.seed = options.seed;
