@@ -91,26 +91,34 @@ Vector3f PathRenderer::skylight(const Vector3f& p, const Vector3f& normal, const
   return (facing / kPi) / (sampler_.density(direction) + facing / kPi) * environment_.sky(direction);
 }
 
-/// What a diffuse direction that leaves the world brings.
-Vector3f PathRenderer::sky_found(const Vector3f& direction, float facing) const {
-  const Vector3f sky = environment_.sky(direction);
-  if (search_ == SkySearch::kOpening) return Vector3f::Zero();  // it has been looked for
-  if (search_ == SkySearch::kByChance) return sky;
-  return (facing / kPi) / (sampler_.density(direction) + facing / kPi) * sky;
-}
-
-// An even point of the opening stands for all of it: its radiance times solid angle a unit of area. Close
-// under the opening that would be single bright samples: it is held below a solid angle of a hemisphere's
-// size, which takes a little light from the walls' upper ends.
+// The same with points of the opening in place of bright directions.
 Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& normal, const Vector2f& random) const {
   const Skylight& opening = *options_.skylight;
   const Vector2f at = opening.extent.min() + opening.extent.sizes().cwiseProduct(random);
   const Vector3f way(at.x() - p.x(), at.y() - p.y(), opening.height - p.z());
-  const float squared = way.squaredNorm(), distance = std::sqrt(squared);
-  const float facing = normal.dot(way) / distance;
+  const Vector3f direction = way.normalized();
+  const float facing = normal.dot(direction);
   if (facing <= 0 || way.z() <= 0 || everything_.occluded(p, way, 0, 1)) return Vector3f::Zero();
-  const float solid_angle = std::min(opening.extent.volume() * (way.z() / distance) / squared, 2 * kPi);
-  return facing * solid_angle / kPi * environment_.sky(way / distance);
+  return (facing / kPi) / (opening_density(p, direction) + facing / kPi) * environment_.sky(direction);
+}
+
+/// Probability a steradian that an even point of the opening lies in this direction.
+float PathRenderer::opening_density(const Vector3f& p, const Vector3f& direction) const {
+  const Skylight& opening = *options_.skylight;
+  const float distance = (opening.height - p.z()) / direction.z();
+  if (!(direction.z() > 0) || !(distance > 0)) return 0;
+  const Vector2f at = p.head<2>() + distance * direction.head<2>();
+  if (!opening.extent.contains(at)) return 0;
+  return distance * distance / (opening.extent.volume() * direction.z());
+}
+
+/// What a diffuse direction that leaves the world brings.
+Vector3f PathRenderer::sky_found(const Vector3f& p, const Vector3f& direction, float facing) const {
+  const Vector3f sky = environment_.sky(direction);
+  if (search_ == SkySearch::kByChance) return sky;
+  const float density =
+      search_ == SkySearch::kOpening ? opening_density(p, direction) : sampler_.density(direction);
+  return (facing / kPi) / (density + facing / kPi) * sky;
 }
 
 // A path goes on in a direction of diffuse reflection; where it leaves the world it has found the sky, and
@@ -126,7 +134,7 @@ Vector3f PathRenderer::incoming(Vector3f from, RayHit hit, int k, PixelSamples& 
     const Vector3f direction = diffuse_direction(
         hit.normal, search_ == SkySearch::kByChance ? sky : first ? samples.around[k] : samples.stream.pair());
     const auto next = everything_.trace(from, direction);
-    if (!next) return light + throughput.cwiseProduct(sky_found(direction, hit.normal.dot(direction)));
+    if (!next) return light + throughput.cwiseProduct(sky_found(from, direction, hit.normal.dot(direction)));
     if (bounce == options_.bounces) return light;
     hit = *next;
     const Vector3f p = from + hit.distance * direction;

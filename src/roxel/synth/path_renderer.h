@@ -27,8 +27,8 @@ struct Picture {
   Mask transient;  ///< share of the pixel's samples that met what stands here for a while
 };
 
-/// An opening in a horizontal plane that all light of the sky comes through, in a world that is closed
-/// otherwise. It is looked for straight away, which leaves less grain than waiting for paths to find it.
+/// An opening in a horizontal plane that nearly all light of the sky comes through. It is looked for straight
+/// away, which leaves less grain than waiting for paths to find it.
 struct Skylight {
   Eigen::AlignedBox2f extent;
   float height;
@@ -65,7 +65,8 @@ class PathRenderer {
                            const Eigen::Vector2f& random) const;
   Eigen::Vector3f skylight(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
                            const Eigen::Vector2f& random) const;
-  Eigen::Vector3f sky_found(const Eigen::Vector3f& direction, float facing) const;
+  Eigen::Vector3f sky_found(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float facing) const;
+  float opening_density(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
   Eigen::Vector3f light_from_above(const Eigen::Vector3f& p, const Eigen::Vector3f& normal,
                                    const Eigen::Vector2f& random) const;
 

@@ -31,7 +31,7 @@ std::vector<Texture> glazes(std::uint32_t seed) {
     return marks(Vector3f(around, 0, p.z()), Vector3f::UnitY());
   };
   return {outside, grained(uniform_paint(0xd9a441), 0.05f, 0.5f, seed + 40),
-          mottled(0xf0e6d0, 0x9fb4b0, 0.09f, seed + 50)};
+          grained(banded({0xf0e6d0, 0x8fb4c0, 0xd9b070, 0xe0c8c0, 0x9fc0a0}, 0.06f, seed + 50), 0.05f, 0.7f, seed + 51)};
 }
 
 void add_body(MeshBuilder& build) {
