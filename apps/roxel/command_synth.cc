@@ -1,12 +1,14 @@
 /// roxel synth: synthetic data sets with ground truth.
 
 #include <cstdio>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "command.h"
 #include "common.h"
 #include "roxel/base/error.h"
 #include "roxel/io/image_file.h"
+#include "roxel/synth/dataset_text.h"
 #include "roxel/synth/demo_world.h"
 #include "roxel/synth/world_writer.h"
 
@@ -53,8 +55,11 @@ void add_world_options(OptionTable<CommandOptions>& table) {
       .check("WIDTHxHEIGHT, each 16 to 16384", is_size);
   table.add("seed", [](CommandOptions& o) -> std::uint32_t& { return o.world.seed; })
       .help("Changes textures, clutter, weather and noise");
-  table.add("background", &CommandOptions::background,
-            {{"auto", BackgroundChoice::kAuto}, {"black", BackgroundChoice::kBlack}, {"sky", BackgroundChoice::kSky}})
+  table
+      .add("background", &CommandOptions::background,
+           {{"auto", BackgroundChoice::kAuto},
+            {"black", BackgroundChoice::kBlack},
+            {"sky", BackgroundChoice::kSky}})
       .help("What is behind the world; auto: its own");
   table.add("samples", [](CommandOptions& o) -> std::optional<int>& { return o.world.samples; })
       .help("Light paths a pixel; more are slower and less grainy (not for demo)")
@@ -64,13 +69,16 @@ void add_world_options(OptionTable<CommandOptions>& table) {
 
 void add_trouble_options(OptionTable<CommandOptions>& table) {
   table.group("Light and trouble (not for demo)");
-  table.add("light", &CommandOptions::light,
-            {{"auto", LightChoice::kAuto},
-             {"constant", LightChoice::kConstant},
-             {"daylight", LightChoice::kDaylight},
-             {"overcast", LightChoice::kOvercast},
-             {"mix", LightChoice::kMix}})
-      .help("One light for all, or each occasion's own: clear, under cloud, or both in turn; auto: the world's own");
+  table
+      .add("light", &CommandOptions::light,
+           {{"auto", LightChoice::kAuto},
+            {"constant", LightChoice::kConstant},
+            {"daylight", LightChoice::kDaylight},
+            {"overcast", LightChoice::kOvercast},
+            {"mix", LightChoice::kMix}})
+      .help(
+          "One light for all, or each occasion's own: clear, under cloud, or both in turn; auto: the world's "
+          "own");
   table.add("moving-shadows", [](CommandOptions& o) -> bool& { return o.world.moving_shadows; })
       .help("Occasions have dates and times of their own, so that the sun moves");
   table.add("transients", [](CommandOptions& o) -> int& { return o.world.transients; })
@@ -131,25 +139,57 @@ void print_made(const Invocation& invocation, const CommandOptions& options, con
 /// The demo has none of these; an option that does nothing is an error.
 void refuse_for_demo(const CommandOptions& options) {
   const SynthOptions& w = options.world;
-  const char* name = w.samples           ? "samples"
+  const char* name = w.samples                             ? "samples"
                      : options.light != LightChoice::kAuto ? "light"
-                     : !w.moving_shadows ? "moving-shadows"
-                     : w.transients > 0  ? "transients"
-                     : w.noise > 0       ? "noise"
-                     : w.pose_noise.any() ? "pose-noise"
-                                          : nullptr;
+                     : !w.moving_shadows                   ? "moving-shadows"
+                     : w.transients > 0                    ? "transients"
+                     : w.noise > 0                         ? "noise"
+                     : w.pose_noise.any()                  ? "pose-noise"
+                                                           : nullptr;
   if (name) throw_invalid(std::string("--") + name, "world demo", "another world; the demo does not have it");
 }
 
-int run_demo(const Invocation& invocation, const CommandOptions& options, Session& session) {
-  refuse_for_demo(options);
+/// What transforms.json in a folder holds; null where there is none or it cannot be read.
+nlohmann::json older_data_set(const fs::path& folder) {
+  std::ifstream in(folder / "transforms.json");
+  return in ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
+}
+
+/// Only what this command has made may be replaced: photographs cannot be made again.
+void check_older(const fs::path& folder) {
+  if (!fs::exists(folder / "transforms.json")) return;
+  const nlohmann::json older = older_data_set(folder);
+  if (older.is_object() && older.value("generator", nlohmann::json()) == kSyntheticGenerator) return;
+  throw_invalid(folder.string(), "a data set that roxel synth did not make", "another folder");
+}
+
+/// Files of an older synthetic data set, so that none is left over beside the new one.
+void remove_older(const fs::path& folder) {
+  const nlohmann::json older = older_data_set(folder);
+  std::error_code ignored;
+  if (!older.is_object() || !older.contains("frames")) return;
+  for (const auto& frame : older["frames"])
+    for (const auto& [key, value] : frame.items()) {
+      const bool file = key.ends_with("_path") && value.is_string();
+      if (!file) continue;
+      const fs::path path = fs::path(value.get<std::string>()).lexically_normal();
+      if (path.is_relative() && *path.begin() != "..") fs::remove(folder / path, ignored);
+    }
+  for (const char* name : {"transforms.json", "transforms_true.json", "illumination.json", "mesh.ply"})
+    fs::remove(folder / name, ignored);
+}
+
+int run_demo(const Invocation& invocation, const CommandOptions& options, const fs::path& folder,
+             Session& session) {
   DemoWorldOptions world;
   world.images = options.world.images.value_or(world.images);
   world.width = options.world.width.value_or(world.width);
   world.height = options.world.height.value_or(world.height);
   world.seed = options.world.seed;
   if (options.background == BackgroundChoice::kSky) world.background = DemoBackground::kSky;
-  write_demo_world(invocation.output, world, {write_picture, write_grey, write_depth}, session.context());
+  PartialResults results(folder);
+  write_demo_world(results.path(), world, {write_picture, write_grey, write_depth}, session.context());
+  results.publish([&] { remove_older(folder); });
   session.display().clear();
   print_made(invocation, options,
              std::to_string(world.images) + " photographs with cameras, masks and true depth",
@@ -173,25 +213,31 @@ int run_synth(const Invocation& invocation, const CommandOptions& given) {
   options.world.light = light_kind(options.light);
 
   Session session(options.common);
+  if (!world) refuse_for_demo(options);
+  check_older(invocation.output);
   const OutputFolder folder(invocation.output);
-  if (!world) return run_demo(invocation, options, session);
+  if (!world) return run_demo(invocation, options, folder.path(), session);
   const WorldWriters writers{write_picture, write_grey, write_radiance, write_depth};
-  const SynthSummary made = write_world(invocation.output, *world, options.world, writers, session.context());
+  PartialResults results(folder.path());
+  const SynthSummary made = write_world(results.path(), *world, options.world, writers, session.context());
+  results.publish([&] { remove_older(folder.path()); });
   session.display().clear();
-  print_made(invocation, options,
-             std::to_string(made.images) + " photographs with cameras, depth, albedo, normals, light and mesh",
-             {{"images", made.images},
-              {"size", {made.width, made.height}},
-              {"occasions", made.occasions},
-              {"triangles", made.triangles},
-              {"points", made.points}});
+  print_made(
+      invocation, options,
+      std::to_string(made.images) + " photographs with cameras, depth, albedo, normals, light and mesh",
+      {{"images", made.images},
+       {"size", {made.width, made.height}},
+       {"occasions", made.occasions},
+       {"triangles", made.triangles},
+       {"points", made.points}});
   return 0;
 }
 
 }  // namespace
 
 void add_synth(Commands& commands) {
-  CommandForm form{"synth", "Make photographs of a synthetic world, with exact cameras and the truth about them",
+  CommandForm form{"synth",
+                   "Make photographs of a synthetic world, with exact cameras and the truth about them",
                    "WORLD", "DATASET"};
   form.details =
       "Worlds: demo    a temple on an island\n"

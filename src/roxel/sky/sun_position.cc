@@ -26,7 +26,8 @@ SunPosition sun_position(double time_utc_s, double latitude_deg, double longitud
 Eigen::Vector3d sun_direction(const SunPosition& sun) {
   const double azimuth = sun.azimuth_deg * std::numbers::pi / 180;
   const double elevation = sun.elevation_deg * std::numbers::pi / 180;
-  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth), std::sin(elevation)};
+  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
+          std::sin(elevation)};
 }
 
 }  // namespace roxel

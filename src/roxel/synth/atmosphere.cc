@@ -16,8 +16,8 @@ const Vector3d kAirScattering(5.802e-3, 13.558e-3, 33.1e-3);
 const Vector3d kOzoneAbsorption(0.650e-3, 1.881e-3, 0.085e-3);
 constexpr double kAirHeight = 8, kHazeHeight = 1.2, kHazeAlbedo = 0.92, kHazeForward = 0.76;
 
-constexpr int kHeights = 48, kAngles = 192;         // of the table of transmittance
-constexpr int kSunHeights = 12, kSunAngles = 24;    // of the table of multiple scattering
+constexpr int kHeights = 48, kAngles = 192;       // of the table of transmittance
+constexpr int kSunHeights = 12, kSunAngles = 24;  // of the table of multiple scattering
 
 double air_phase(double cosine) { return 3 / (16 * kPi) * (1 + cosine * cosine); }
 
@@ -73,7 +73,8 @@ Vector3d look_up(const std::vector<Vector3d>& table, int columns, double x, doub
   const int i = std::min(static_cast<int>(x), columns - 2), j = std::min(static_cast<int>(y), rows - 2);
   const double s = x - i, t = y - j;
   const auto at = [&](int column, int row) -> const Vector3d& { return table[row * columns + column]; };
-  return (1 - t) * ((1 - s) * at(i, j) + s * at(i + 1, j)) + t * ((1 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
+  return (1 - t) * ((1 - s) * at(i, j) + s * at(i + 1, j)) +
+         t * ((1 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
 }
 
 }  // namespace
@@ -143,7 +144,8 @@ void Atmosphere::march_multiple(double height, double mu_sun, Vector3d& once, Ve
         const Medium here = medium(place.height);
         const Vector3d step = (-(to - from) * here.extinction).array().exp();
         const Vector3d scattering = here.air + Vector3d::Constant(here.haze);
-        const Vector3d gathered = clear.cwiseProduct((Vector3d::Ones() - step).cwiseQuotient(here.extinction));
+        const Vector3d gathered =
+            clear.cwiseProduct((Vector3d::Ones() - step).cwiseQuotient(here.extinction));
         const Vector3d sun = transmittance(place.height, place.mu_sun);
         once += kEven * gathered.cwiseProduct(scattering).cwiseProduct(sun);
         again += gathered.cwiseProduct(scattering);
@@ -165,7 +167,8 @@ void Atmosphere::tabulate_multiple() {
 }
 
 Vector3d Atmosphere::multiple(double height, double mu_sun) const {
-  return look_up(multiple_, kSunAngles, angle_coordinate(mu_sun, kSunAngles), height_coordinate(height, kSunHeights));
+  return look_up(multiple_, kSunAngles, angle_coordinate(mu_sun, kSunAngles),
+                 height_coordinate(height, kSunHeights));
 }
 
 Vector3d Atmosphere::radiance(const Vector3d& direction, const Vector3d& to_sun) const {
@@ -181,8 +184,8 @@ Vector3d Atmosphere::radiance(const Vector3d& direction, const Vector3d& to_sun)
     const Vector3d gathered = clear.cwiseProduct((Vector3d::Ones() - step).cwiseQuotient(here.extinction));
     const Vector3d once = transmittance(place.height, place.mu_sun)
                               .cwiseProduct(air * here.air + Vector3d::Constant(haze * here.haze));
-    const Vector3d often = multiple(place.height, place.mu_sun)
-                               .cwiseProduct(here.air + Vector3d::Constant(here.haze));
+    const Vector3d often =
+        multiple(place.height, place.mu_sun).cwiseProduct(here.air + Vector3d::Constant(here.haze));
     light += gathered.cwiseProduct(once + often);
     clear = clear.cwiseProduct(step);
   }

@@ -17,8 +17,8 @@ Vector3d toward(double azimuth_deg, double elevation_deg) {
 // Straight up the layers' depths add: air 8 km, ozone a triangle of 15 km, haze as given.
 TEST(Atmosphere, LightFromTheZenithFollowsBeersLaw) {
   for (const double haze : {0.0, 0.3}) {
-    const Vector3d depth = 8 * Vector3d(5.802e-3, 13.558e-3, 33.1e-3) + 15 * Vector3d(0.650e-3, 1.881e-3, 0.085e-3) +
-                           Vector3d::Constant(haze);
+    const Vector3d depth = 8 * Vector3d(5.802e-3, 13.558e-3, 33.1e-3) +
+                           15 * Vector3d(0.650e-3, 1.881e-3, 0.085e-3) + Vector3d::Constant(haze);
     const Vector3d expected = (-depth).array().exp();
     EXPECT_LT((Atmosphere(haze).transmittance(1) - expected).norm(), 2e-3) << haze;
   }
@@ -74,7 +74,8 @@ TEST(Atmosphere, IsFiniteAndPositiveEverywhere) {
     for (double elevation = 0; elevation <= 90; elevation += 5)
       for (double azimuth = 0; azimuth < 360; azimuth += 45) {
         const Vector3d light = air.radiance(toward(azimuth, elevation), toward(0, sun));
-        ASSERT_TRUE(light.allFinite() && (light.array() >= 0).all()) << sun << " " << elevation << " " << azimuth;
+        ASSERT_TRUE(light.allFinite() && (light.array() >= 0).all())
+            << sun << " " << elevation << " " << azimuth;
       }
 }
 

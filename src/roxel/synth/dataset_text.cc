@@ -56,8 +56,8 @@ std::string images_text(const SyntheticCameras& set, const std::vector<SparsePoi
     const Pose& pose = set.frames[i].camera.pose;
     const Eigen::Quaterniond q(pose.rotation);
     const Eigen::Vector3d t = -(pose.rotation * pose.centre);
-    append(text, "%d %.17g %.17g %.17g %.17g %.17g %.17g %.17g 1 ", i + 1, q.w(), q.x(), q.y(), q.z(),
-           t.x(), t.y(), t.z());
+    append(text, "%d %.17g %.17g %.17g %.17g %.17g %.17g %.17g 1 ", i + 1, q.w(), q.x(), q.y(), q.z(), t.x(),
+           t.y(), t.z());
     text += set.frames[i].name + set.image_suffix + "\n";
     for (const auto& [p, o] : seen[i]) {
       const Eigen::Vector2d& pixel = points[p].observations[o].pixel;
@@ -104,6 +104,7 @@ ordered_json frame_json(const SyntheticFrame& frame, const SyntheticCameras& set
 void write_synthetic_transforms(const std::filesystem::path& file, const SyntheticCameras& set) {
   const Intrinsics& k = set.frames.front().camera.intrinsics;
   ordered_json root;
+  root["generator"] = kSyntheticGenerator;
   root["camera_model"] = "PINHOLE";
   root["w"] = k.width;
   root["h"] = k.height;
@@ -138,9 +139,10 @@ std::string utc_text(double time_utc_s) {
   const year_month_day date{day};
   const hh_mm_ss clock{time - day};
   std::string text;
-  append(text, "%04d-%02u-%02uT%02d:%02d:%02dZ", static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
-         static_cast<unsigned>(date.day()), static_cast<int>(clock.hours().count()),
-         static_cast<int>(clock.minutes().count()), static_cast<int>(clock.seconds().count()));
+  append(text, "%04d-%02u-%02uT%02d:%02d:%02dZ", static_cast<int>(date.year()),
+         static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+         static_cast<int>(clock.hours().count()), static_cast<int>(clock.minutes().count()),
+         static_cast<int>(clock.seconds().count()));
   return text;
 }
 

@@ -27,8 +27,8 @@ struct SyntheticCameras {
   std::vector<SyntheticFrame> frames;
   Eigen::AlignedBox3d bounds;
   std::string image_suffix = ".png";
-  bool masked = true;          ///< there is mask/NAME.png
-  bool with_surfaces = false;  ///< there are albedo/NAME.exr and normal/NAME.exr
+  bool masked = true;            ///< there is mask/NAME.png
+  bool with_surfaces = false;    ///< there are albedo/NAME.exr and normal/NAME.exr
   bool with_transients = false;  ///< there is transient/NAME.png
   struct Place {
     double latitude_deg, longitude_deg;
@@ -36,7 +36,10 @@ struct SyntheticCameras {
   std::optional<Place> place = {};
 };
 
-/// FOLDER/FILE: OpenGL camera-to-world matrices (x right, y up, looking along -z).
+/// What transforms.json has as its generator: such a data set may be replaced by another one.
+inline constexpr const char* kSyntheticGenerator = "roxel synth";
+
+/// A transforms.json: OpenGL camera-to-world matrices (x right, y up, looking along -z).
 void write_synthetic_transforms(const std::filesystem::path& file, const SyntheticCameras& set);
 
 /// FOLDER/sparse/0/cameras.txt, images.txt, points3D.txt.

@@ -24,7 +24,8 @@ float solid_angle(float angular_radius) { return 2 * kPi * (1 - std::cos(angular
 Vector3f map_direction(const Image& map, float u, float v) {
   const float azimuth = (u / static_cast<float>(map.width()) - 0.5f) * 2 * kPi;
   const float elevation = (0.5f - v / static_cast<float>(map.height())) * kPi;
-  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth), std::sin(elevation)};
+  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
+          std::sin(elevation)};
 }
 
 Vector2f map_position(const Image& map, const Vector3f& direction) {
@@ -73,7 +74,8 @@ Image Environment::map_with_disc() const {
       const float turn = 2 * kPi * static_cast<float>(k) / kSpokes;
       const Vector3f direction = w + std::tan(radius) * (std::cos(turn) * u + std::sin(turn) * v);
       const Vector2f at = map_position(map, direction.normalized());
-      const int x = std::min(static_cast<int>(at.x()), kWidth - 1), y = std::min(static_cast<int>(at.y()), kHeight - 1);
+      const int x = std::min(static_cast<int>(at.x()), kWidth - 1),
+                y = std::min(static_cast<int>(at.y()), kHeight - 1);
       const float elevation = (0.5f - (static_cast<float>(y) + 0.5f) / kHeight) * kPi;
       const float pixel = (2 * kPi / kWidth) * (kPi / kHeight) * std::cos(elevation);
       Eigen::Map<Vector3f>(map.pixel(x, y)) += sun_.irradiance / (pixel * kRings * kSpokes);

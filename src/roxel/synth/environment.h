@@ -17,9 +17,9 @@ Eigen::Vector3f map_direction(const Image& map, float u, float v);
 Eigen::Vector2f map_position(const Image& map, const Eigen::Vector3f& direction);
 
 struct Sun {
-  Eigen::Vector3f direction = Eigen::Vector3f::UnitZ();   ///< unit, to the sun
-  Eigen::Vector3f irradiance = Eigen::Vector3f::Zero();   ///< on a surface that faces it; zero = no sun
-  float angular_radius_rad = 0.00476f;                    ///< 0.2725 degrees
+  Eigen::Vector3f direction = Eigen::Vector3f::UnitZ();  ///< unit, to the sun
+  Eigen::Vector3f irradiance = Eigen::Vector3f::Zero();  ///< on a surface that faces it; zero = no sun
+  float angular_radius_rad = 0.00476f;                   ///< 0.2725 degrees
   /// Radiance of the disc, all of one brightness.
   Eigen::Vector3f radiance() const;
 };
@@ -29,7 +29,8 @@ class Environment {
   static constexpr int kWidth = 512, kHeight = 256;
 
   /// `radiance` of every direction apart from the sun's disc, sampled at the map's pixel centres.
-  Environment(const std::function<Eigen::Vector3f(const Eigen::Vector3f& direction)>& radiance, const Sun& sun);
+  Environment(const std::function<Eigen::Vector3f(const Eigen::Vector3f& direction)>& radiance,
+              const Sun& sun);
 
   const Sun& sun() const { return sun_; }
   const Image& map_without_disc() const { return map_; }

@@ -39,11 +39,13 @@ TEST(SkyMap, HasNorthInTheMiddleEastToTheRightAndTheZenithOnTop) {
 TEST(Environment, OfOneBrightnessGivesPiTimesItOnTheGround) {
   EXPECT_LT((uniform(2).sky_irradiance() - Vector3f::Constant(2 * kPi)).norm(), 2e-3f);
   const Environment sunny = uniform(2, sun_at({3, 0, 4}));
-  EXPECT_LT((sunny.total_irradiance() - sunny.sky_irradiance() - 0.8f * sunny.sun().irradiance).norm(), 1e-5f);
+  EXPECT_LT((sunny.total_irradiance() - sunny.sky_irradiance() - 0.8f * sunny.sun().irradiance).norm(),
+            1e-5f);
 }
 
 TEST(Environment, TheDiscInTheMapCarriesTheSunsLight) {
-  for (const Vector3f& direction : {Vector3f(1, 0.2f, 0.5f), Vector3f(0.01f, -0.02f, 1), Vector3f(0, -1, 0.3f)}) {
+  for (const Vector3f& direction :
+       {Vector3f(1, 0.2f, 0.5f), Vector3f(0.01f, -0.02f, 1), Vector3f(0, -1, 0.3f)}) {
     const Environment sky = uniform(0.5f, sun_at(direction));
     const Image with = sky.map_with_disc(), &without = sky.map_without_disc();
     Vector3f sum = Vector3f::Zero();
@@ -72,7 +74,8 @@ Environment spotted() {
   const Vector3f spot = Vector3f(-1, 0.4f, 0.6f).normalized();
   return Environment(
       [=](const Vector3f& d) {
-        return Vector3f(Vector3f::Constant(d.z() < 0 ? 0.01f : 0.3f + 20 * std::pow(std::max(d.dot(spot), 0.0f), 60.0f)));
+        return Vector3f(
+            Vector3f::Constant(d.z() < 0 ? 0.01f : 0.3f + 20 * std::pow(std::max(d.dot(spot), 0.0f), 60.0f)));
       },
       {});
 }

@@ -48,7 +48,8 @@ void add_wall_around(MeshBuilder& build, const Panel& p) {
   const Opening& o = p.hole;
   build.quad({p.x0, 0, p.z0}, {o.left, 0, p.z0}, {o.left, 0, p.z1}, {p.x0, 0, p.z1});
   build.quad({o.right, 0, p.z0}, {p.x1, 0, p.z0}, {p.x1, 0, p.z1}, {o.right, 0, p.z1});
-  if (o.bottom > p.z0) build.quad({o.left, 0, p.z0}, {o.right, 0, p.z0}, {o.right, 0, o.bottom}, {o.left, 0, o.bottom});
+  if (o.bottom > p.z0)
+    build.quad({o.left, 0, p.z0}, {o.right, 0, p.z0}, {o.right, 0, o.bottom}, {o.left, 0, o.bottom});
   const std::vector<float> stops = edge_stops(o);
   for (std::size_t i = 0; i + 1 < stops.size(); ++i) {
     const float a = stops[i], b = stops[i + 1];
@@ -70,7 +71,8 @@ void add_reveal(MeshBuilder& build, const Opening& o, float depth) {
 
 /// What closes the hole at the reveal's end.
 void add_back(MeshBuilder& build, const Opening& o, float depth) {
-  build.quad({o.left, depth, o.bottom}, {o.right, depth, o.bottom}, {o.right, depth, o.top}, {o.left, depth, o.top});
+  build.quad({o.left, depth, o.bottom}, {o.right, depth, o.bottom}, {o.right, depth, o.top},
+             {o.left, depth, o.top});
 }
 
 void add_frame(MeshBuilder& build, const Opening& o) {
@@ -111,16 +113,23 @@ void add_ground_opening(MeshBuilder& build, const Panel& panel, bool arcade, con
 
 Panel ground_panel(const Facade& f, float x0, float x1, int column) {
   const float w = x1 - x0;
-  if (f.arcade) return {x0, x1, 0, f.ground_height, {x0 + 0.16f * w, x1 - 0.16f * w, 0, 0.86f * f.ground_height, true}};
+  if (f.arcade)
+    return {x0, x1, 0, f.ground_height, {x0 + 0.16f * w, x1 - 0.16f * w, 0, 0.86f * f.ground_height, true}};
   const bool door = lattice_hash(column, 5, 0, f.seed) % 3 == 0;
   const float side = door ? 0.3f : 0.16f;
-  return {x0, x1, 0, f.ground_height,
+  return {x0,
+          x1,
+          0,
+          f.ground_height,
           {x0 + side * w, x1 - side * w, door ? 0.0f : 0.7f, 0.74f * f.ground_height, false}};
 }
 
 Panel window_panel(const Facade& f, float x0, float x1, int floor) {
   const float w = x1 - x0, z0 = f.ground_height + f.floor_height * static_cast<float>(floor);
-  return {x0, x1, z0, z0 + f.floor_height,
+  return {x0,
+          x1,
+          z0,
+          z0 + f.floor_height,
           {x0 + 0.26f * w, x1 - 0.26f * w, z0 + 0.28f * f.floor_height, z0 + 0.84f * f.floor_height,
            f.arched_windows && floor == 0}};
 }
@@ -146,7 +155,8 @@ void add_facade(MeshBuilder& build, const Facade& f, const Eigen::Affine3f& plac
     const float x0 = f.width * static_cast<float>(i) / static_cast<float>(columns);
     const float x1 = f.width * static_cast<float>(i + 1) / static_cast<float>(columns);
     add_ground_opening(build, ground_panel(f, x0, x1, i), f.arcade, f.materials);
-    for (int floor = 0; floor < f.floors; ++floor) add_window(build, window_panel(f, x0, x1, floor), f.materials);
+    for (int floor = 0; floor < f.floors; ++floor)
+      add_window(build, window_panel(f, x0, x1, floor), f.materials);
   }
   add_ledges(build, f);
 }

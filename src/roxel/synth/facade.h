@@ -14,10 +14,10 @@ struct FacadeMaterials {
 
 struct Facade {
   float width = 10;
-  int floors = 3;            ///< above the ground floor
+  int floors = 3;  ///< above the ground floor
   float floor_height = 3.1f;
   float ground_height = 4.0f;
-  bool arcade = false;       ///< the ground floor opens in arches
+  bool arcade = false;          ///< the ground floor opens in arches
   bool arched_windows = false;  ///< on the first floor above
   float window_spacing = 2.6f;  ///< about
   FacadeMaterials materials{};

@@ -56,8 +56,9 @@ std::string illumination_json(const World& world, const Lights& lights) {
       {"world", "X east, Y north, Z up"},
       {"azimuth", "degrees clockwise from north (+Y)"},
       {"elevation", "degrees above the horizon, without refraction"},
-      {"equirect", "row 0 = zenith; centre column = north (+Y); to the right = east (+X); az = (u/W - 0.5)*360, "
-                   "el = (0.5 - v/H)*180, pixel centres at +0.5"},
+      {"equirect",
+       "row 0 = zenith; centre column = north (+Y); to the right = east (+X); az = (u/W - 0.5)*360, "
+       "el = (0.5 - v/H)*180, pixel centres at +0.5"},
       {"radiance_units", "linear Rec.709, one factor for all; photographs are radiance times exposure"}};
   root["nodes"] = ordered_json::array();
   for (int i = 0; i < static_cast<int>(lights.all.size()); ++i)

@@ -102,7 +102,8 @@ Environment daylight(const Vector3f& to_sun, const Weather& weather) {
   const Atmosphere air(weather.haze_depth);
   const Vector3d sun_d = to_sun.cast<double>();
   const Vector3f clear_light = clear_irradiance(air, sun_d);
-  const Vector3f grey_light = static_cast<float>(weather.cloud_light) * clear_light.mean() * Vector3f(0.94f, 1.0f, 1.07f);
+  const Vector3f grey_light =
+      static_cast<float>(weather.cloud_light) * clear_light.mean() * Vector3f(0.94f, 1.0f, 1.07f);
   const bool overcast = weather.kind == Weather::Kind::kOvercast;
   const bool clouds = weather.kind == Weather::Kind::kPartlyCloudy;
 

@@ -22,7 +22,8 @@ struct Weather {
 /// "clear", "partly cloudy", "overcast".
 std::string to_string(Weather::Kind kind);
 
-/// Sky and sun outdoors: radiance in units in which the sun outside the atmosphere gives an irradiance of 3.5.
+/// Sky and sun outdoors: radiance in units in which the sun outside the atmosphere gives an irradiance
+/// of 3.5.
 Environment daylight(const Eigen::Vector3f& to_sun, const Weather& weather);
 /// A large lamp and a surround that is brighter above: a white surface that faces the lamp has radiance of
 /// about 1.

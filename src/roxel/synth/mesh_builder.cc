@@ -63,7 +63,8 @@ void MeshBuilder::surface(int nu, int nv, const std::function<Vector3f(float, fl
   const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < columns; ++i)
-      vertex(point(static_cast<float>(i) / static_cast<float>(nu), static_cast<float>(j) / static_cast<float>(nv)));
+      vertex(point(static_cast<float>(i) / static_cast<float>(nu),
+                   static_cast<float>(j) / static_cast<float>(nv)));
   const auto at = [&](int i, int j) {
     return first + static_cast<std::uint32_t>((j % rows) * columns + i % columns);
   };
@@ -77,13 +78,12 @@ void MeshBuilder::surface(int nu, int nv, const std::function<Vector3f(float, fl
 void MeshBuilder::lathe(std::span<const Vector2f> profile, int segments) {
   const int last = static_cast<int>(profile.size()) - 1;
   ROXEL_CHECK_GE(last, 1);
-  surface(
-      segments, last,
-      [&](float u, float v) {
-        const Vector2f& p = profile[static_cast<std::size_t>(std::lround(v * static_cast<float>(last)))];
-        return Vector3f(p.x() * std::cos(kTurn * u), p.x() * std::sin(kTurn * u), p.y());
-      },
-      {true, false});
+  surface(segments, last,
+          [&](float u, float v) {
+            const Vector2f& p = profile[static_cast<std::size_t>(std::lround(v * static_cast<float>(last)))];
+            return Vector3f(p.x() * std::cos(kTurn * u), p.x() * std::sin(kTurn * u), p.y());
+          },
+          {true, false});
 }
 
 // Each ring's frame is the one before it turned as little as possible.
@@ -101,15 +101,15 @@ void MeshBuilder::tube(std::span<const Vector3f> path, float radius, int segment
     }
   }
   // Ring -1 and ring last + 1 are the middles of the ends.
-  surface(
-      segments, last + 2,
-      [&](float s, float t) {
-        const int ring = static_cast<int>(std::lround(t * static_cast<float>(last + 2))) - 1;
-        if (ring < 0) return path.front();
-        if (ring > last) return path.back();
-        return Vector3f(path[ring] + radius * (std::cos(kTurn * s) * u[ring] + std::sin(kTurn * s) * v[ring]));
-      },
-      {true, false});
+  surface(segments, last + 2,
+          [&](float s, float t) {
+            const int ring = static_cast<int>(std::lround(t * static_cast<float>(last + 2))) - 1;
+            if (ring < 0) return path.front();
+            if (ring > last) return path.back();
+            return Vector3f(path[ring] +
+                            radius * (std::cos(kTurn * s) * u[ring] + std::sin(kTurn * s) * v[ring]));
+          },
+          {true, false});
 }
 
 void MeshBuilder::cylinder(const Vector3f& from, const Vector3f& to, float radius, int segments) {
@@ -118,15 +118,14 @@ void MeshBuilder::cylinder(const Vector3f& from, const Vector3f& to, float radiu
 }
 
 void MeshBuilder::ellipsoid(const Vector3f& centre, const Vector3f& radii, int segments) {
-  surface(
-      segments, segments / 2,
-      [&](float u, float v) {
-        const float polar = 0.5f * kTurn * v;
-        const Vector3f unit(std::sin(polar) * std::cos(kTurn * u), std::sin(polar) * std::sin(kTurn * u),
-                            std::cos(polar));
-        return Vector3f(centre + radii.cwiseProduct(unit));
-      },
-      {true, false});
+  surface(segments, segments / 2,
+          [&](float u, float v) {
+            const float polar = 0.5f * kTurn * v;
+            const Vector3f unit(std::sin(polar) * std::cos(kTurn * u), std::sin(polar) * std::sin(kTurn * u),
+                                std::cos(polar));
+            return Vector3f(centre + radii.cwiseProduct(unit));
+          },
+          {true, false});
 }
 
 std::vector<Vector2f> smooth_profile(std::span<const Vector2f> knots, int steps) {

@@ -47,13 +47,12 @@ TEST(MeshBuilder, TurnedAndSweptThingsHaveTheirAreas) {
 
 TEST(MeshBuilder, ARingOfSurfaceCellsHasNoOpenEdge) {
   TriangleMesh torus;
-  MeshBuilder(torus).surface(
-      12, 8,
-      [](float u, float v) {
-        const float a = 6.2831853f * u, b = 6.2831853f * v, r = 2 + std::cos(b);
-        return Vector3f(r * std::cos(a), r * std::sin(a), std::sin(b));
-      },
-      {true, true});
+  MeshBuilder(torus).surface(12, 8,
+                             [](float u, float v) {
+                               const float a = 6.2831853f * u, b = 6.2831853f * v, r = 2 + std::cos(b);
+                               return Vector3f(r * std::cos(a), r * std::sin(a), std::sin(b));
+                             },
+                             {true, true});
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (const auto& t : torus.triangles)
     for (int i = 0; i < 3; ++i) ++edges[std::minmax(t[i], t[(i + 1) % 3])];

@@ -64,8 +64,9 @@ PathRenderer::PathRenderer(const RayScene& everything, const RayScene& lasting,
   ROXEL_CHECK_GE(options.bounces, 0);
   // An even sky is best found by the diffuse directions themselves.
   constexpr float kPeaked = 8;
-  search_ = options.skylight ? SkySearch::kOpening
-                             : sampler_.peak() > kPeaked ? SkySearch::kBrightParts : SkySearch::kByChance;
+  search_ = options.skylight            ? SkySearch::kOpening
+            : sampler_.peak() > kPeaked ? SkySearch::kBrightParts
+                                        : SkySearch::kByChance;
   frame_about(environment.sun().direction, sun_u_, sun_v_);
 }
 
@@ -92,7 +93,8 @@ Vector3f PathRenderer::skylight(const Vector3f& p, const Vector3f& normal, const
 }
 
 // The same with points of the opening in place of bright directions.
-Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& normal, const Vector2f& random) const {
+Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& normal,
+                                        const Vector2f& random) const {
   const Skylight& opening = *options_.skylight;
   const Vector2f at = opening.extent.min() + opening.extent.sizes().cwiseProduct(random);
   const Vector3f way(at.x() - p.x(), at.y() - p.y(), opening.height - p.z());
@@ -129,10 +131,12 @@ Vector3f PathRenderer::incoming(Vector3f from, RayHit hit, int k, PixelSamples& 
   for (int bounce = 0;; ++bounce) {
     const bool first = bounce == 0;
     const Vector2f sky = first ? samples.sky[k] : samples.stream.pair();
-    if (search_ == SkySearch::kOpening) light += throughput.cwiseProduct(light_from_above(from, hit.normal, sky));
+    if (search_ == SkySearch::kOpening)
+      light += throughput.cwiseProduct(light_from_above(from, hit.normal, sky));
     if (search_ == SkySearch::kBrightParts) light += throughput.cwiseProduct(skylight(from, hit.normal, sky));
-    const Vector3f direction = diffuse_direction(
-        hit.normal, search_ == SkySearch::kByChance ? sky : first ? samples.around[k] : samples.stream.pair());
+    const Vector3f direction = diffuse_direction(hit.normal, search_ == SkySearch::kByChance ? sky
+                                                             : first ? samples.around[k]
+                                                                     : samples.stream.pair());
     const auto next = everything_.trace(from, direction);
     if (!next) return light + throughput.cwiseProduct(sky_found(from, direction, hit.normal.dot(direction)));
     if (bounce == options_.bounces) return light;
@@ -178,7 +182,8 @@ PathRenderer::PixelLight PathRenderer::light_of_pixel(const PinholeCamera& camer
 }
 
 /// What lasts, for the truth; what is there at the moment is returned.
-std::optional<RayHit> PathRenderer::measure_pixel(const PinholeCamera& camera, int x, int y, Picture& picture) const {
+std::optional<RayHit> PathRenderer::measure_pixel(const PinholeCamera& camera, int x, int y,
+                                                  Picture& picture) const {
   const Ray ray = camera.ray(x + 0.5, y + 0.5);
   const Vector3f origin = ray.origin.cast<float>(), direction = ray.direction.cast<float>();
   const auto hit = lasting_.trace(origin, direction);

@@ -35,8 +35,8 @@ struct Skylight {
 };
 
 struct PathOptions {
-  int samples = 16;              ///< rays a pixel, at least 1
-  int bounces = 2;               ///< diffuse reflections of light that is not the sun's or sky's own, at least 0
+  int samples = 16;  ///< rays a pixel, at least 1
+  int bounces = 2;   ///< diffuse reflections of light that is not the sun's or sky's own, at least 0
   bool environment_seen = true;  ///< whether cameras see the sky; black otherwise
   /// Light of the sky and of other surfaces is smoothed along each surface in so many passes
   /// (light_filter.h). The sun's own light and its shadows are not.
@@ -77,7 +77,7 @@ class PathRenderer {
   PathOptions options_;
   SkySampler sampler_;
   enum class SkySearch { kByChance, kBrightParts, kOpening } search_;  ///< how paths find the sky
-  Eigen::Vector3f sun_u_, sun_v_;  ///< across the direction to the sun
+  Eigen::Vector3f sun_u_, sun_v_;                                      ///< across the direction to the sun
 };
 
 }  // namespace roxel

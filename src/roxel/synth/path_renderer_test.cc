@@ -26,7 +26,8 @@ Environment peaked_sky() {
   const Vector3f spot = Vector3f(0.3f, -0.5f, 0.8f).normalized();
   return Environment(
       [=](const Vector3f& d) {
-        return Vector3f(Vector3f::Constant(d.z() < 0 ? 0 : 0.5f + 30 * std::pow(std::max(d.dot(spot), 0.0f), 100.0f)));
+        return Vector3f(
+            Vector3f::Constant(d.z() < 0 ? 0 : 0.5f + 30 * std::pow(std::max(d.dot(spot), 0.0f), 100.0f)));
       },
       {});
 }
@@ -35,7 +36,8 @@ std::vector<Texture> flat(float albedo) {
   return {[=](const Vector3f&, const Vector3f&) { return Vector3f(Vector3f::Constant(albedo)); }};
 }
 
-PinholeCamera camera_at(const Vector3d& centre, const Vector3d& target, int width = 24, int height = 24, double focal = 2) {
+PinholeCamera camera_at(const Vector3d& centre, const Vector3d& target, int width = 24, int height = 24,
+                        double focal = 2) {
   return {simple_intrinsics(width, height, focal), looking_at(centre, target)};
 }
 
@@ -124,7 +126,8 @@ TEST(PathRenderer, APolesShadowPointsAwayFromTheSun) {
   build.quad({-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0});
   build.cylinder({0, 0, 0}, {0, 0, 1}, 0.03f, 16);
   const PinholeCamera camera = camera_at({0, 0, 8}, {0, 0, 0}, 160, 160, 1.6);
-  for (const Vector3f& to_sun : {Vector3f(1, 0.5f, 1), Vector3f(-0.7f, 0.2f, 0.6f), Vector3f(0.1f, -1, 0.9f)}) {
+  for (const Vector3f& to_sun :
+       {Vector3f(1, 0.5f, 1), Vector3f(-0.7f, 0.2f, 0.6f), Vector3f(0.1f, -1, 0.9f)}) {
     const Picture picture = studio.picture(camera, only_sun(to_sun), 1);
     const float lit = to_sun.normalized().z();
     Vector3d tip = Vector3d::Zero();

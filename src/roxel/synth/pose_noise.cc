@@ -14,7 +14,8 @@ using Eigen::Vector3d;
 Vector3d normal_vector(int item, int what, std::uint32_t seed) {
   Vector3d v;
   for (int i = 0; i < 3; ++i) {
-    const double radius = std::sqrt(-2 * std::log(1 - static_cast<double>(lattice_random(item, what, 2 * i, seed))));
+    const double radius =
+        std::sqrt(-2 * std::log(1 - static_cast<double>(lattice_random(item, what, 2 * i, seed))));
     v[i] = radius * std::cos(2 * std::numbers::pi * lattice_random(item, what, 2 * i + 1, seed));
   }
   return v;
@@ -36,7 +37,8 @@ std::vector<PinholeCamera> with_pose_noise(std::vector<PinholeCamera> cameras, c
     int item = 0;
     while (item < static_cast<int>(centres.size()) && centres[item] != camera.pose.centre) ++item;
     if (item == static_cast<int>(centres.size())) centres.push_back(camera.pose.centre);
-    const Vector3d angles = noise.rotation_deg * std::numbers::pi / 180 * normal_vector(item, 0, seed ^ 0x905eu);
+    const Vector3d angles =
+        noise.rotation_deg * std::numbers::pi / 180 * normal_vector(item, 0, seed ^ 0x905eu);
     camera.pose.rotation = camera.pose.rotation * turned_by(angles);
     camera.pose.centre += noise.translation * normal_vector(item, 1, seed ^ 0x905eu);
   }

@@ -22,7 +22,9 @@ class SampleStream {
  public:
   SampleStream(int x, int y, int image, std::uint32_t seed) : key_(lattice_hash(x, y, image, seed)) {}
 
-  std::uint32_t bits() { return lattice_hash(static_cast<int>(key_), static_cast<int>(++count_), 0, 0x51edu); }
+  std::uint32_t bits() {
+    return lattice_hash(static_cast<int>(key_), static_cast<int>(++count_), 0, 0x51edu);
+  }
   /// In [0, 1).
   float number() { return static_cast<float>(bits() >> 8) * (1.0f / 16777216.0f); }
   Eigen::Vector2f pair() {
@@ -35,7 +37,8 @@ class SampleStream {
     const Eigen::Vector2f shift = pair();
     pairs.resize(static_cast<std::size_t>(count));
     for (int k = 0; k < count; ++k) pairs[k] = even_point(k, shift);
-    for (int k = count - 1; k > 0; --k) std::swap(pairs[k], pairs[bits() % static_cast<std::uint32_t>(k + 1)]);
+    for (int k = count - 1; k > 0; --k)
+      std::swap(pairs[k], pairs[bits() % static_cast<std::uint32_t>(k + 1)]);
   }
 
  private:

@@ -47,7 +47,8 @@ SkySampler::SkySampler(const Environment& environment) {
 
 Vector3f SkySampler::direction(const Vector2f& random) const {
   const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), random.x());
-  const int cell = static_cast<int>(std::min<std::ptrdiff_t>(found - cumulative_.begin(), kColumns * kRows - 1));
+  const int cell =
+      static_cast<int>(std::min<std::ptrdiff_t>(found - cumulative_.begin(), kColumns * kRows - 1));
   const float before = cell > 0 ? cumulative_[cell - 1] : 0.0f, share = cumulative_[cell] - before;
   const float across = share > 0 ? std::clamp((random.x() - before) / share, 0.0f, 1.0f) : 0.5f;
   const int row = cell / kColumns, column = cell % kColumns;

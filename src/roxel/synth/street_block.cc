@@ -46,7 +46,8 @@ constexpr int kWallCount = 7;
 
 std::vector<Texture> stuffs(std::uint32_t seed) {
   const auto bricks = [&](std::vector<std::uint32_t> paints, float w, float h, std::uint32_t s) {
-    return grained(tiles({std::move(paints), 0xb0a898, w, h, 0.1f * h, 0.5f}, seed + s), 1.6f, 0.35f, seed + s + 1);
+    return grained(tiles({std::move(paints), 0xb0a898, w, h, 0.1f * h, 0.5f}, seed + s), 1.6f, 0.35f,
+                   seed + s + 1);
   };
   const auto plaster = [&](std::uint32_t a, std::uint32_t b, std::uint32_t s) {
     return grained(mottled(a, b, 1.4f, seed + s), 0.12f, 0.3f, seed + s + 1);
@@ -99,8 +100,10 @@ void add_roof(MeshBuilder& build, const House& house, const Affine3f& place) {
   build.use(house.roof);
   if (house.gable) {
     const float ridge = z + 0.32f * d, out = 0.4f;
-    build.quad({-out, -out, z - 0.1f}, {w + out, -out, z - 0.1f}, {w + out, 0.5f * d, ridge}, {-out, 0.5f * d, ridge});
-    build.quad({-out, d + out, z - 0.1f}, {w + out, d + out, z - 0.1f}, {w + out, 0.5f * d, ridge}, {-out, 0.5f * d, ridge});
+    build.quad({-out, -out, z - 0.1f}, {w + out, -out, z - 0.1f}, {w + out, 0.5f * d, ridge},
+               {-out, 0.5f * d, ridge});
+    build.quad({-out, d + out, z - 0.1f}, {w + out, d + out, z - 0.1f}, {w + out, 0.5f * d, ridge},
+               {-out, 0.5f * d, ridge});
     build.use(house.front.materials.wall);
     for (const float x : {0.0f, w}) build.triangle({x, 0, z}, {x, d, z}, {x, 0.5f * d, ridge - 0.1f});
     build.box({0.7f * w, 0.3f * d, z}, {0.7f * w + 0.7f, 0.3f * d + 0.7f, ridge + 0.6f});
@@ -180,8 +183,10 @@ void add_clutter(MeshBuilder& build, const Affine3f& frame, std::uint32_t seed) 
   const auto at = [&](float x, float y, float turn = 0) { return frame * placed({x, y, 0}, turn); };
   const auto random = [&](int i, int what) { return lattice_random(i, what, 2, seed); };
   for (int i = 0; i < 8; ++i) {
-    const float x = -37 + 10.5f * static_cast<float>(i) + 2 * random(i, 0), y = (i % 2 ? 1.0f : -1.0f) * (5.2f + random(i, 1));
-    add_tree(build, at(x, y, 6 * random(i, 2)), kBark, i % 3 ? kLeavesA : kLeavesB, lattice_hash(i, 3, 2, seed));
+    const float x = -37 + 10.5f * static_cast<float>(i) + 2 * random(i, 0),
+                y = (i % 2 ? 1.0f : -1.0f) * (5.2f + random(i, 1));
+    add_tree(build, at(x, y, 6 * random(i, 2)), kBark, i % 3 ? kLeavesA : kLeavesB,
+             lattice_hash(i, 3, 2, seed));
   }
   for (int i = 0; i < 10; ++i) {
     const float x = -38 + 8.4f * static_cast<float>(i);
@@ -191,7 +196,8 @@ void add_clutter(MeshBuilder& build, const Affine3f& frame, std::uint32_t seed) 
   }
   for (int i = 0; i < 5; ++i) {
     const float x = -34 + 15.5f * static_cast<float>(i) + 3 * random(i, 4);
-    add_car(build, at(x, i % 2 ? 5.0f : -5.0f, 0.06f * random(i, 5) + (i % 2 ? 0 : 2 * kQuarter)), kCarA + i % 3, kGlass, kTyre);
+    add_car(build, at(x, i % 2 ? 5.0f : -5.0f, 0.06f * random(i, 5) + (i % 2 ? 0 : 2 * kQuarter)),
+            kCarA + i % 3, kGlass, kTyre);
     add_bench(build, at(x + 6, i % 2 ? -6.9f : 7.0f, i % 2 ? 2 * kQuarter : 0), kWood, kMetal);
   }
   add_fountain(build, at(2, 0.5f), kStone, kWater);

@@ -1,6 +1,7 @@
 #pragma once
-/// An urban block: a long square between rows of houses, with trees, cars and a fountain. Metres, the pavement
-/// at z = 0, turned away from north; the square runs from x = -42 to 42 and y = -9 to 9 in its own frame.
+/// An urban block: a long square between rows of houses, with trees, cars and a fountain. Metres, the
+/// pavement at z = 0, turned away from north; the square runs from x = -42 to 42 and y = -9 to 9 in its own
+/// frame.
 
 #include <Eigen/Geometry>
 

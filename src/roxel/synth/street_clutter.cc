@@ -14,7 +14,9 @@ using Eigen::Vector3f;
 class Dice {
  public:
   explicit Dice(std::uint32_t seed) : seed_(seed) {}
-  float operator()(float from, float to) { return from + (to - from) * lattice_random(++count_, 0, 0, seed_); }
+  float operator()(float from, float to) {
+    return from + (to - from) * lattice_random(++count_, 0, 0, seed_);
+  }
   Vector3f direction() {
     const float z = (*this)(-1, 1), turn = (*this)(0, 6.2832f), flat = std::sqrt(1 - z * z);
     return {flat * std::cos(turn), flat * std::sin(turn), z};
@@ -59,7 +61,8 @@ void add_tree(MeshBuilder& build, const Eigen::Affine3f& place, int bark, int le
 void add_lamp_post(MeshBuilder& build, const Eigen::Affine3f& place, int metal, int globe) {
   build.place(place);
   build.use(metal);
-  const Vector2f shaft[] = {{0, 0}, {0.14f, 0}, {0.14f, 0.25f}, {0.06f, 0.5f}, {0.045f, 3.8f}, {0.09f, 3.9f}, {0, 3.9f}};
+  const Vector2f shaft[] = {{0, 0},         {0.14f, 0},    {0.14f, 0.25f}, {0.06f, 0.5f},
+                            {0.045f, 3.8f}, {0.09f, 3.9f}, {0, 3.9f}};
   build.lathe(shaft, 12);
   build.use(globe);
   build.ellipsoid({0, 0, 4.12f}, Vector3f::Constant(0.22f), 20);
@@ -108,7 +111,9 @@ void add_fountain(MeshBuilder& build, const Eigen::Affine3f& place, int stone, i
   build.use(stone);
   const Vector2f basin[] = {{2.2f, 0}, {2.2f, 0.65f}, {2.3f, 0.7f}, {2.0f, 0.7f}, {1.95f, 0.3f}, {0, 0.3f}};
   build.lathe(basin, 40);
-  const Vector2f knots[] = {{0.5f, 0.3f}, {0.45f, 0.6f}, {0.22f, 0.9f}, {0.25f, 1.6f}, {0.18f, 2.2f}, {0.8f, 2.6f}, {0.85f, 2.7f}, {0.1f, 2.6f}, {0.14f, 3.1f}, {0.25f, 3.4f}, {0, 3.7f}};
+  const Vector2f knots[] = {{0.5f, 0.3f},  {0.45f, 0.6f}, {0.22f, 0.9f}, {0.25f, 1.6f},
+                            {0.18f, 2.2f}, {0.8f, 2.6f},  {0.85f, 2.7f}, {0.1f, 2.6f},
+                            {0.14f, 3.1f}, {0.25f, 3.4f}, {0, 3.7f}};
   build.lathe(smooth_profile(knots, 3), 28);
   build.use(water);
   const Vector2f surface[] = {{1.97f, 0.5f}, {0, 0.5f}};

@@ -1,5 +1,6 @@
 #pragma once
-/// What stands about in streets: trees, lamps, cars, benches. Each on z = 0 at the placement's origin, metres.
+/// What stands about in streets: trees, lamps, cars, benches. Each on z = 0 at the placement's origin,
+/// metres.
 
 #include <cstdint>
 

@@ -53,7 +53,8 @@ Vector3f with_marks(const Vector3f& below, const Vector2f& at, const std::vector
   if (random(0) > 0.75f) return below;
   const Vector2f q(at.x() - i - 0.5f, at.y() - j - 0.5f);
   const float turn = 3.1416f * random(1);
-  const Vector2f r(std::cos(turn) * q.x() + std::sin(turn) * q.y(), std::cos(turn) * q.y() - std::sin(turn) * q.x());
+  const Vector2f r(std::cos(turn) * q.x() + std::sin(turn) * q.y(),
+                   std::cos(turn) * q.y() - std::sin(turn) * q.x());
   const float wide = 0.12f + 0.3f * random(2), high = 0.07f + 0.24f * random(3);
   const bool disc = random(4) < 0.3f;
   const bool inside = disc ? q.norm() < wide : std::abs(r.x()) < wide && std::abs(r.y()) < high;
@@ -89,8 +90,8 @@ Texture grained(Texture base, float size, float strength, std::uint32_t seed) {
 }
 
 Texture tiles(Tiling tiling, std::uint32_t seed) {
-  return [colors = mixed_paints(tiling.paints), joint_color = paint(tiling.joint_paint), tiling = std::move(tiling),
-          seed](const Vector3f& p, const Vector3f& normal) {
+  return [colors = mixed_paints(tiling.paints), joint_color = paint(tiling.joint_paint),
+          tiling = std::move(tiling), seed](const Vector3f& p, const Vector3f& normal) {
     const Vector2f at = along_surface(p, normal);
     const float t = at.y() / tiling.height;
     const int row = cell_of(t);
@@ -108,14 +109,14 @@ Texture tiles(Tiling tiling, std::uint32_t seed) {
 
 Texture collage(std::uint32_t ground, std::vector<std::uint32_t> paints, float size, std::uint32_t seed) {
   return [ground_color = paint(ground), colors = mixed_paints(paints), size, seed](const Vector3f& p,
-                                                                                 const Vector3f& normal) {
+                                                                                   const Vector3f& normal) {
     const Vector2f at = along_surface(p, normal) / size;
     Vector3f color = ground_color * (1 + 0.25f * fractal_noise(p / (0.4f * size), 4, seed));
     float frequency = 1;
     for (int layer = 0; layer < 4; ++layer, frequency *= 2.2f)
       color = with_marks(color, frequency * at + Vector2f(0.37f, 0.61f) * static_cast<float>(layer), colors,
                          seed + 10 + static_cast<std::uint32_t>(layer));
-    return reflectance(color * (1 + 0.3f * fractal_noise(p / (0.06f * size), 3, seed + 4)));
+    return reflectance(color * (1 + 0.25f * fractal_noise(p / (0.08f * size), 2, seed + 4)));
   };
 }
 
@@ -129,9 +130,11 @@ Texture planks(std::uint32_t dark, std::uint32_t light, float width, std::uint32
     const float along = (at.x() + start) / length - piece;
     const float tone = lattice_random(board, piece, 1, seed);
     const Vector3f stretched(at.x() / (2.2f * width), at.y() / (0.16f * width), 7.0f * tone + 0.1f * board);
-    const float grain = fractal_noise(stretched, 4, seed + 2) + 0.5f * fractal_noise(p / (0.1f * width), 3, seed + 5);
+    const float grain =
+        fractal_noise(stretched, 4, seed + 2) + 0.5f * fractal_noise(p / (0.1f * width), 3, seed + 5);
     const float joint = std::min({across, 1 - across, 9 * along, 9 * (1 - along)});
-    return Vector3f(mix(a, b, 0.25f + 0.5f * tone + 0.6f * grain) * (0.35f + 0.65f * ramp(0.0f, 0.05f, joint)));
+    return Vector3f(mix(a, b, 0.25f + 0.5f * tone + 0.6f * grain) *
+                    (0.35f + 0.65f * ramp(0.0f, 0.05f, joint)));
   };
 }
 

@@ -12,7 +12,8 @@ using Eigen::Vector3f;
 
 /// A standing figure of height 1.
 void add_figure(MeshBuilder& build) {
-  const Vector2f knots[] = {{0, 0}, {0.14f, 0}, {0.10f, 0.3f}, {0.15f, 0.55f}, {0.17f, 0.78f}, {0.06f, 0.84f}, {0.09f, 0.93f}, {0, 1}};
+  const Vector2f knots[] = {{0, 0},         {0.14f, 0},     {0.10f, 0.3f},  {0.15f, 0.55f},
+                            {0.17f, 0.78f}, {0.06f, 0.84f}, {0.09f, 0.93f}, {0, 1}};
   build.lathe(smooth_profile(knots, 4), 20);
 }
 

@@ -24,11 +24,10 @@ Eigen::AlignedBox3f TriangleMesh::bounds() const {
 }
 
 std::string ply_bytes(const TriangleMesh& mesh) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                      std::to_string(mesh.vertices.size()) +
-                      "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
-                      std::to_string(mesh.triangles.size()) +
-                      "\nproperty list uchar int vertex_indices\nend_header\n";
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.vertices.size()) +
+      "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
+      std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
   for (const Eigen::Vector3f& vertex : mesh.vertices)
     for (int i = 0; i < 3; ++i) append_bytes(bytes, vertex[i]);
   for (const auto& triangle : mesh.triangles) {

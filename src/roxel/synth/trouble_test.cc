@@ -74,8 +74,9 @@ TEST(SensorNoise, IsNoneAtZeroAndAnotherForAnotherSeedOrImage) {
 std::vector<PinholeCamera> cameras(int count, bool one_centre) {
   std::vector<PinholeCamera> all;
   for (int i = 0; i < count; ++i)
-    all.push_back({simple_intrinsics(64, 48, 1),
-                   looking_at(one_centre ? Vector3d(1, 2, 3) : Vector3d(i, 0.5 * i, 3), Vector3d(0, 5 + i, 0))});
+    all.push_back(
+        {simple_intrinsics(64, 48, 1),
+         looking_at(one_centre ? Vector3d(1, 2, 3) : Vector3d(i, 0.5 * i, 3), Vector3d(0, 5 + i, 0))});
   return all;
 }
 

@@ -50,11 +50,11 @@ struct World {
   bool occasions_are_nodes = false;     ///< shots of one occasion have one optical centre
   bool outdoors = false;                ///< constant light is a clear noon instead of a studio
   Eigen::Vector3f lamp_direction = {-0.45f, -0.65f, 0.62f};  ///< to the studio's lamp, any length
-  float surround = 1;                 ///< brightness of the studio's surround
+  float surround = 1;                                        ///< brightness of the studio's surround
   std::optional<Skylight> skylight = {};
-  bool environment_seen = true;         ///< cameras see the sky where nothing stands; else black
-  bool masked = true;                   ///< masks belong to the data set
-  bool high_dynamic_range = false;      ///< photographs are radiance in EXR files, not 8-bit PNG
+  bool environment_seen = true;             ///< cameras see the sky where nothing stands; else black
+  bool masked = true;                       ///< masks belong to the data set
+  bool high_dynamic_range = false;          ///< photographs are radiance in EXR files, not 8-bit PNG
   std::vector<Eigen::AlignedBox3f> stages;  ///< where nothing stands and passing things may
   float transient_size = 0.3f;              ///< height of a passing thing, world units
 };

@@ -6,7 +6,6 @@
 
 #include "roxel/synth/camera_paths.h"
 #include "roxel/synth/mesh_builder.h"
-#include "roxel/synth/noise.h"
 #include "roxel/synth/world.h"
 
 namespace roxel {
@@ -37,8 +36,8 @@ float hill_at(const Hill& hill, const Vector3f& d) {
 /// Distance of the face from the head's middle in a direction.
 float face_radius(const Vector3f& d) {
   static const Hill kHills[] = {
-      {{0, -1, -0.10f}, 0.09f, 0.20f, 0.17f},     // bridge of the nose
-      {{0, -1, -0.22f}, 0.10f, 0.09f, 0.15f},     // its tip
+      {{0, -1, -0.10f}, 0.09f, 0.20f, 0.17f},      // bridge of the nose
+      {{0, -1, -0.22f}, 0.10f, 0.09f, 0.15f},      // its tip
       {{0.10f, -1, -0.24f}, 0.06f, 0.06f, 0.06f},  // its wings
       {{-0.10f, -1, -0.24f}, 0.06f, 0.06f, 0.06f},
       {{0.33f, -1, 0.06f}, 0.15f, 0.11f, -0.11f},  // sockets of the eyes
@@ -47,7 +46,7 @@ float face_radius(const Vector3f& d) {
       {{-0.33f, -1, 0.27f}, 0.22f, 0.07f, 0.06f},
       {{0.55f, -0.85f, -0.22f}, 0.18f, 0.18f, 0.06f},  // cheeks
       {{-0.55f, -0.85f, -0.22f}, 0.18f, 0.18f, 0.06f},
-      {{0, -1, -0.50f}, 0.20f, 0.05f, 0.06f},   // lips
+      {{0, -1, -0.50f}, 0.20f, 0.05f, 0.06f},  // lips
       {{0, -1, -0.59f}, 0.17f, 0.05f, 0.06f},
       {{0, -1, -0.545f}, 0.20f, 0.018f, -0.03f},
       {{0, -0.85f, -0.85f}, 0.20f, 0.16f, 0.13f},  // chin
@@ -72,8 +71,8 @@ float cap_height(const Vector3f& d) {
 }
 
 std::vector<Texture> paints(std::uint32_t seed) {
-  const Texture cap = tiles({{0xb23a2a, 0x1f5f8b, 0xe0b040, 0xf4efe6, 0x2f7d5b}, 0x33312f, 0.16f, 0.16f, 0.014f, 0.5f},
-                            seed);
+  const Texture cap =
+      tiles({{0xb23a2a, 0x1f5f8b, 0xe0b040, 0xf4efe6, 0x2f7d5b}, 0x33312f, 0.16f, 0.16f, 0.014f, 0.5f}, seed);
   return {uniform_paint(0xd9a98a),
           foliage(0x2a1a12, 0x8a5a34, 0.07f, seed + 1),
           cap,
@@ -88,7 +87,8 @@ int part_at(const Vector3f& d) {
   const bool hair = d.y() > 0.12f - 0.3f * d.z() && d.z() > -0.55f;
   if (hair) return kHair;
   const Vector3f f = d / -std::min(d.y(), -1e-3f);  // on the plane before the face
-  const bool lips = d.y() < -0.5f && std::abs(f.x()) < 0.21f && std::abs(f.z() + 0.545f) < 0.085f * (1 - 4 * f.x() * f.x());
+  const bool lips =
+      d.y() < -0.5f && std::abs(f.x()) < 0.21f && std::abs(f.z() + 0.545f) < 0.085f * (1 - 4 * f.x() * f.x());
   return lips ? kLips : kSkin;
 }
 
@@ -128,7 +128,8 @@ void add_neck(MeshBuilder& build) {
   build.use(kSkin);
   build.cylinder({0, 0.12f, -1.5f}, {0, 0.1f, -0.6f}, 0.38f, 64);
   build.use(kScarf);
-  const Vector2f knots[] = {{0, -1.78f}, {0.62f, -1.78f}, {0.74f, -1.7f}, {0.66f, -1.5f}, {0.5f, -1.36f}, {0.52f, -1.22f}, {0.44f, -1.13f}, {0.3f, -1.15f}};
+  const Vector2f knots[] = {{0, -1.78f},    {0.62f, -1.78f}, {0.74f, -1.7f},  {0.66f, -1.5f},
+                            {0.5f, -1.36f}, {0.52f, -1.22f}, {0.44f, -1.13f}, {0.3f, -1.15f}};
   build.place(placed({0, 0.12f, 0}));
   build.lathe(smooth_profile(knots, 6), 96);
   build.place(Eigen::Affine3f::Identity());

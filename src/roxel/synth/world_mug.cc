@@ -6,7 +6,6 @@
 
 #include "roxel/synth/camera_paths.h"
 #include "roxel/synth/mesh_builder.h"
-#include "roxel/synth/noise.h"
 #include "roxel/synth/world.h"
 
 namespace roxel {
@@ -23,22 +22,33 @@ enum Glaze { kOutside, kHandle, kHollow };
 std::vector<Texture> glazes(std::uint32_t seed) {
   const Texture bands = banded({0xd9702e, 0x1f5f8b, 0xe9dfc9, 0x2f7d5b, 0xd9a441, 0x8a2c4e}, 0.11f, seed);
   const Texture marks =
-      collage(0xe9dfc9, {0xb23a2a, 0x1f5f8b, 0xe0b040, 0x2f7d5b, 0x33312f}, 0.16f, seed + 20);
+      collage(0xe9dfc9, {0xb23a2a, 0x1f5f8b, 0xe0b040, 0x2f7d5b, 0x33312f}, 0.24f, seed + 20);
   // A printed belt between painted bands; its plane is the one that the mug's side faces.
   const Texture outside = [bands, marks](const Vector3f& p, const Vector3f& n) {
     if (p.z() < 0.22f || p.z() > 0.6f) return bands(p, n);
     const float around = kRadius * std::atan2(p.y(), p.x());
     return marks(Vector3f(around, 0, p.z()), Vector3f::UnitY());
   };
-  return {outside, grained(uniform_paint(0xd9a441), 0.05f, 0.5f, seed + 40),
-          grained(banded({0xf0e6d0, 0x8fb4c0, 0xd9b070, 0xe0c8c0, 0x9fc0a0}, 0.06f, seed + 50), 0.05f, 0.7f, seed + 51)};
+  const Texture scales = tiles(
+      {{0xf0e6d0, 0x8fb4c0, 0xd9b070, 0xe0c8c0, 0x9fc0a0}, 0xb0a898, 0.11f, 0.09f, 0.01f, 0.5f}, seed + 50);
+  const Texture bottom = collage(0xf0e6d0, {0x8fb4c0, 0xd9b070, 0x6f8f7a, 0xb5654a}, 0.2f, seed + 51);
+  const Texture hollow = [scales, bottom](const Vector3f& p, const Vector3f& n) {
+    if (std::abs(n.z()) > 0.7f) return bottom(p, n);
+    return scales(Vector3f(kInside * std::atan2(p.y(), p.x()), 0, p.z()), Vector3f::UnitY());
+  };
+  return {outside, grained(uniform_paint(0xd9a441), 0.05f, 0.5f, seed + 40), hollow};
 }
 
 void add_body(MeshBuilder& build) {
-  const Vector2f outside[] = {{0, 0}, {0.30f, 0}, {0.36f, 0.01f}, {kRadius, 0.06f}, {kRadius, 0.4f}, {kRadius, kHeight - 0.015f}};
-  const Vector2f lip[] = {{kRadius, kHeight - 0.015f}, {0.393f, kHeight - 0.004f}, {0.38f, kHeight},
-                          {0.367f, kHeight - 0.004f},  {kInside, kHeight - 0.015f}};
-  const Vector2f inside[] = {{kInside, kHeight - 0.015f}, {kInside, 0.12f}, {0.33f, 0.06f}, {0.26f, 0.04f}, {0, 0.04f}};
+  const Vector2f outside[] = {{0, 0},           {0.30f, 0},      {0.36f, 0.01f},
+                              {kRadius, 0.06f}, {kRadius, 0.4f}, {kRadius, kHeight - 0.015f}};
+  const Vector2f lip[] = {{kRadius, kHeight - 0.015f},
+                          {0.393f, kHeight - 0.004f},
+                          {0.38f, kHeight},
+                          {0.367f, kHeight - 0.004f},
+                          {kInside, kHeight - 0.015f}};
+  const Vector2f inside[] = {
+      {kInside, kHeight - 0.015f}, {kInside, 0.12f}, {0.33f, 0.06f}, {0.26f, 0.04f}, {0, 0.04f}};
   build.use(kOutside);
   build.lathe(outside, 128);
   build.use(kHollow);

@@ -30,8 +30,8 @@ World plane_world(const WorldRequest& request) {
   world.environment_seen = false;
   world.stages = {{Vector3f(-0.6f, -0.9f, -0.7f), Vector3f(0.6f, -0.6f, 0.4f)}};
   world.transient_size = 0.35f;
-  world.materials = {collage(0xd8cdb4, {0xb23a2a, 0x1f5f8b, 0xe0b040, 0x2f7d5b, 0x33312f, 0xf4efe6, 0x7a4a7c}, 0.42f,
-                             request.seed)};
+  world.materials = {collage(0xd8cdb4, {0xb23a2a, 0x1f5f8b, 0xe0b040, 0x2f7d5b, 0x33312f, 0xf4efe6, 0x7a4a7c},
+                             0.42f, request.seed)};
   MeshBuilder build(world.mesh);
   build.box({-1, -0.03f, -1}, {1, 0.03f, 1});
   add_shots(world, request);

@@ -16,7 +16,7 @@ using Eigen::Vector2f;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr float kTop = 0.75f;                         // of the table
+constexpr float kTop = 0.75f;                                // of the table
 constexpr float kHalfX = 2.6f, kHalfY = 2.3f, kWall = 3.4f;  // of the room
 
 enum Stuff {
@@ -50,7 +50,8 @@ enum Stuff {
 std::vector<Texture> stuffs(std::uint32_t seed) {
   return {
       planks(0x4a2f1c, 0xa9743f, 0.11f, seed),
-      tiles({{0xe9dfc9, 0xb5452f, 0xe9dfc9, 0x2d4a7c, 0xd9a441}, 0xf4efe6, 0.035f, 0.035f, 0.004f, 0}, seed + 1),
+      tiles({{0xe9dfc9, 0xb5452f, 0xe9dfc9, 0x2d4a7c, 0xd9a441}, 0xf4efe6, 0.035f, 0.035f, 0.004f, 0},
+            seed + 1),
       banded({0xd9702e, 0x1f5f8b, 0xe9dfc9, 0x2f7d5b}, 0.022f, seed + 2),
       grained(banded({0x14506b, 0x39aa9a, 0xe8dcc4, 0x1c7f9c}, 0.018f, seed + 3), 0.02f, 0.4f, seed + 4),
       mottled(0xa01a1a, 0xd9b23a, 0.03f, seed + 5),
@@ -82,7 +83,8 @@ void hollow(MeshBuilder& build, std::vector<Vector2f> outside, float wall) {
   std::vector<Vector2f> profile = outside;
   for (std::size_t i = outside.size() - 1; i > 0; --i) {
     const Vector2f& p = outside[i];
-    profile.emplace_back(std::max(p.x() - wall, 0.0f), i == outside.size() - 1 ? p.y() : std::max(p.y(), wall));
+    profile.emplace_back(std::max(p.x() - wall, 0.0f),
+                         i == outside.size() - 1 ? p.y() : std::max(p.y(), wall));
   }
   profile.emplace_back(0, wall);
   build.lathe(profile, 72);
@@ -103,7 +105,8 @@ void add_cup(MeshBuilder& build) {
 void add_bowl(MeshBuilder& build) {
   build.place(placed({0.17f, 0.15f, kTop + 0.0015f}));
   build.use(kBowl);
-  const Vector2f knots[] = {{0.0f, 0.0f}, {0.045f, 0.002f}, {0.05f, 0.012f}, {0.09f, 0.04f}, {0.115f, 0.075f}, {0.12f, 0.085f}};
+  const Vector2f knots[] = {{0.0f, 0.0f},   {0.045f, 0.002f}, {0.05f, 0.012f},
+                            {0.09f, 0.04f}, {0.115f, 0.075f}, {0.12f, 0.085f}};
   hollow(build, smooth_profile(knots, 5), 0.006f);
   build.use(kApple);
   build.ellipsoid({-0.035f, 0.02f, 0.06f}, {0.038f, 0.038f, 0.035f}, 48);
@@ -117,7 +120,8 @@ void add_bowl(MeshBuilder& build) {
 void add_vase(MeshBuilder& build, std::uint32_t seed) {
   build.place(placed({0.0f, -0.01f, kTop + 0.0015f}));
   build.use(kVase);
-  const Vector2f knots[] = {{0.0f, 0.0f}, {0.04f, 0.0f}, {0.065f, 0.05f}, {0.06f, 0.12f}, {0.03f, 0.18f}, {0.028f, 0.2f}, {0.042f, 0.235f}};
+  const Vector2f knots[] = {{0.0f, 0.0f},   {0.04f, 0.0f},  {0.065f, 0.05f}, {0.06f, 0.12f},
+                            {0.03f, 0.18f}, {0.028f, 0.2f}, {0.042f, 0.235f}};
   hollow(build, smooth_profile(knots, 6), 0.005f);
   build.use(kTwig);
   for (int i = 0; i < 5; ++i) {
@@ -155,8 +159,9 @@ void add_books(MeshBuilder& build) {
     float turn;
   };
   float z = kTop + 0.0015f;
-  for (const Book& book : {Book{kBookA, {0.10f, 0.07f, 0.014f}, 0.35f}, Book{kBookB, {0.085f, 0.062f, 0.011f}, -0.1f},
-                           Book{kBookC, {0.07f, 0.05f, 0.009f}, 0.8f}}) {
+  for (const Book& book :
+       {Book{kBookA, {0.10f, 0.07f, 0.014f}, 0.35f}, Book{kBookB, {0.085f, 0.062f, 0.011f}, -0.1f},
+        Book{kBookC, {0.07f, 0.05f, 0.009f}, 0.8f}}) {
     const Vector3f& h = book.half;
     constexpr float kCover = 0.002f;
     build.place(placed({0.22f, -0.17f, z}, book.turn));
@@ -165,7 +170,8 @@ void add_books(MeshBuilder& build) {
     build.box({-h.x(), -h.y(), 2 * h.z() - kCover}, {h.x(), h.y(), 2 * h.z()});
     build.box({-h.x(), -h.y(), kCover}, {h.x(), -h.y() + kCover, 2 * h.z() - kCover});
     build.use(kPages);
-    build.box({-h.x() + 0.004f, -h.y() + kCover, kCover}, {h.x() - 0.004f, h.y() - 0.004f, 2 * h.z() - kCover});
+    build.box({-h.x() + 0.004f, -h.y() + kCover, kCover},
+              {h.x() - 0.004f, h.y() - 0.004f, 2 * h.z() - kCover});
     z += 2 * h.z();
   }
 }
@@ -173,7 +179,9 @@ void add_books(MeshBuilder& build) {
 void add_candle(MeshBuilder& build) {
   build.place(placed({-0.05f, -0.23f, kTop + 0.0015f}));
   build.use(kBrass);
-  const Vector2f foot[] = {{0, 0}, {0.045f, 0}, {0.045f, 0.006f}, {0.012f, 0.014f}, {0.006f, 0.03f}, {0.006f, 0.12f}, {0.016f, 0.13f}, {0.016f, 0.145f}, {0, 0.145f}};
+  const Vector2f foot[] = {{0, 0},           {0.045f, 0},      {0.045f, 0.006f},
+                           {0.012f, 0.014f}, {0.006f, 0.03f},  {0.006f, 0.12f},
+                           {0.016f, 0.13f},  {0.016f, 0.145f}, {0, 0.145f}};
   build.lathe(foot, 40);
   build.use(kWax);
   build.cylinder({0, 0, 0.14f}, {0, 0, 0.27f}, 0.009f, 24);
@@ -197,7 +205,8 @@ void add_table(MeshBuilder& build) {
   build.use(kTableWood);
   build.box({-0.72f, -0.5f, kTop - 0.035f}, {0.72f, 0.5f, kTop});
   for (float x : {-0.64f, 0.64f})
-    for (float y : {-0.42f, 0.42f}) build.box({x - 0.03f, y - 0.03f, 0}, {x + 0.03f, y + 0.03f, kTop - 0.035f});
+    for (float y : {-0.42f, 0.42f})
+      build.box({x - 0.03f, y - 0.03f, 0}, {x + 0.03f, y + 0.03f, kTop - 0.035f});
   build.use(kCloth);
   build.box({-0.46f, -0.3f, kTop}, {0.46f, 0.3f, kTop + 0.0015f});
 }
@@ -222,7 +231,8 @@ void add_walls(MeshBuilder& build) {
 void add_shelf(MeshBuilder& build, std::uint32_t seed) {
   build.place(placed({0.3f, kHalfY - 0.17f, 0}));
   build.use(kFurniture);
-  for (int level = 0; level < 5; ++level) build.box({-0.8f, -0.15f, 0.4f * level + 0.05f}, {0.8f, 0.17f, 0.4f * level + 0.08f});
+  for (int level = 0; level < 5; ++level)
+    build.box({-0.8f, -0.15f, 0.4f * level + 0.05f}, {0.8f, 0.17f, 0.4f * level + 0.08f});
   for (float x : {-0.82f, 0.8f}) build.box({x, -0.16f, 0}, {x + 0.02f, 0.17f, 1.75f});
   for (int level = 0; level < 5; ++level)
     for (int i = 0; i < 24; ++i) {
@@ -230,7 +240,8 @@ void add_shelf(MeshBuilder& build, std::uint32_t seed) {
       if (random(0) < 0.2f) continue;
       const float at = -0.77f + 0.063f * static_cast<float>(i), z = 0.4f * static_cast<float>(level) + 0.08f;
       build.use(kBookA + static_cast<int>(3 * random(1)));
-      build.box({at, -0.12f + 0.06f * random(2), z}, {at + 0.035f + 0.024f * random(3), 0.12f, z + 0.18f + 0.12f * random(4)});
+      build.box({at, -0.12f + 0.06f * random(2), z},
+                {at + 0.035f + 0.024f * random(3), 0.12f, z + 0.18f + 0.12f * random(4)});
     }
 }
 
@@ -241,7 +252,8 @@ void add_chair(MeshBuilder& build, const Vector3f& at, float turn) {
     build.box({x - 0.02f, -0.22f, 0}, {x + 0.02f, -0.18f, 0.44f});
     build.box({x - 0.02f, 0.18f, 0}, {x + 0.02f, 0.22f, 0.95f});
   }
-  for (int i = 0; i < 3; ++i) build.box({-0.18f, 0.19f, 0.56f + 0.13f * i}, {0.18f, 0.21f, 0.62f + 0.13f * i});
+  for (int i = 0; i < 3; ++i)
+    build.box({-0.18f, 0.19f, 0.56f + 0.13f * i}, {0.18f, 0.21f, 0.62f + 0.13f * i});
   build.use(kFabric);
   build.box({-0.23f, -0.23f, 0.44f}, {0.23f, 0.23f, 0.49f});
 }

@@ -59,7 +59,8 @@ struct Stage {
   const Light& light(int occasion) const { return lights.all[lights.of_occasion[occasion]]; }
 };
 
-Stage set_stage(WorldKind kind, const WorldRequest& request, const SynthOptions& options, LightKind light, int threads) {
+Stage set_stage(WorldKind kind, const WorldRequest& request, const SynthOptions& options, LightKind light,
+                int threads) {
   Stage stage;
   stage.world = make_world(kind, request);
   if (options.environment_seen) stage.world.environment_seen = *options.environment_seen;
@@ -134,11 +135,12 @@ std::vector<PinholeCamera> cameras_of(const World& world) {
 
 std::vector<SparsePoint> points_of(const Stage& stage, int shot_idx, const Picture& picture,
                                    const std::vector<PinholeCamera>& cameras, const SynthOptions& options) {
-  const SurfaceQueries queries{
-      [&](const Vector3d& point, const Vector3d& centre) { return nothing_between(*stage.lasting, point, centre); },
-      [&](const Vector3d&, int x, int y) -> Vector3f {
-        return Eigen::Map<const Vector3f>(picture.rgb.pixel(x, y));
-      }};
+  const SurfaceQueries queries{[&](const Vector3d& point, const Vector3d& centre) {
+                                 return nothing_between(*stage.lasting, point, centre);
+                               },
+                               [&](const Vector3d&, int x, int y) -> Vector3f {
+                                 return Eigen::Map<const Vector3f>(picture.rgb.pixel(x, y));
+                               }};
   const int quota = points_asked_of(shot_idx, static_cast<int>(cameras.size()), options.points);
   return points_of_image(shot_idx, quota, picture.depth, cameras, queries, options.seed);
 }
@@ -201,8 +203,13 @@ SynthSummary write_world(const fs::path& folder, WorldKind kind, const SynthOpti
   if (options.pose_noise.any())
     write_synthetic_transforms(folder / "transforms_true.json", describe(stage, cameras));
   write_synthetic_transforms(folder / "transforms.json", told);
-  return {count, request.width, request.height, light, static_cast<int>(stage.world.times_utc_s.size()),
-          stage.world.mesh.triangles.size(), all.size()};
+  return {count,
+          request.width,
+          request.height,
+          light,
+          static_cast<int>(stage.world.times_utc_s.size()),
+          stage.world.mesh.triangles.size(),
+          all.size()};
 }
 
 }  // namespace roxel

@@ -18,13 +18,13 @@ struct SynthOptions {
   std::optional<int> width = {}, height = {};
   std::uint32_t seed = 1;
   std::optional<LightKind> light = {};
-  bool moving_shadows = true;                   ///< else all occasions have the first one's date and time
-  std::optional<bool> environment_seen = {};    ///< whether cameras see the sky where nothing stands
-  int transients = 0;                           ///< things at each occasion that are at no other
-  double noise = 0;                             ///< add_sensor_noise; 0 = none
-  PoseNoise pose_noise = {};                    ///< of the cameras that are written
-  std::optional<int> samples = {};              ///< rays a pixel
-  int points = 6000;                            ///< sparse points asked for
+  bool moving_shadows = true;                 ///< else all occasions have the first one's date and time
+  std::optional<bool> environment_seen = {};  ///< whether cameras see the sky where nothing stands
+  int transients = 0;                         ///< things at each occasion that are at no other
+  double noise = 0;                           ///< add_sensor_noise; 0 = none
+  PoseNoise pose_noise = {};                  ///< of the cameras that are written
+  std::optional<int> samples = {};            ///< rays a pixel
+  int points = 6000;                          ///< sparse points asked for
 };
 
 /// How pixels get into files: synth stands beside io and knows no image format. Called from several threads

@@ -69,7 +69,8 @@ TEST(Worlds, CamerasSeeTheBoxAndMaterialsExist) {
       if (kind == WorldKind::kStreet) continue;  // its nodes look around, and up
       const Vector3d middle = shot.camera.project(world.bounds.center());
       EXPECT_GT(middle.z(), 0) << static_cast<int>(kind);
-      EXPECT_TRUE(middle.x() > 0 && middle.x() < 48 && middle.y() > -20 && middle.y() < 56) << static_cast<int>(kind);
+      EXPECT_TRUE(middle.x() > 0 && middle.x() < 48 && middle.y() > -20 && middle.y() < 56)
+          << static_cast<int>(kind);
       EXPECT_LE(r(1, 2), 0.02);  // the image's down is not up
     }
     EXPECT_EQ(names.size(), 7u);
@@ -182,7 +183,8 @@ TEST(Street, NodesAreTenMetresApartUnderTheOpenSkyAndTileIt) {
   // Every direction above the horizon is in some image of a node.
   for (int i = 0; i < 2000; ++i) {
     const double up = (i + 0.5) / 2000, turn = 2.399963 * i, flat = std::sqrt(1 - up * up);
-    const Vector3d far = world.shots[0].camera.pose.centre + 100 * Vector3d(flat * std::cos(turn), flat * std::sin(turn), up);
+    const Vector3d far =
+        world.shots[0].camera.pose.centre + 100 * Vector3d(flat * std::cos(turn), flat * std::sin(turn), up);
     int seen = 0;
     for (int k = 0; k < 20; ++k) {
       const Vector3d pixel = world.shots[k].camera.project(far);
