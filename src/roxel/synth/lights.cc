@@ -138,7 +138,7 @@ Environment studio(const Vector3f& to_lamp, float surround) {
       lamp);
 }
 
-Lights make_lights(const World& world, const LightPlan& plan, int threads) {
+Lights make_lights(const World& world, const LightPlan& plan, const RunContext& context) {
   Lights lights;
   const int occasions = static_cast<int>(world.times_utc_s.size());
   const bool one = plan.kind == LightKind::kConstant;
@@ -148,7 +148,8 @@ Lights make_lights(const World& world, const LightPlan& plan, int threads) {
     return lights;
   }
   std::vector<std::unique_ptr<Light>> made(one ? 1 : occasions);
-  parallel_for(static_cast<std::int64_t>(made.size()), threads, [&](std::int64_t index, int) {
+  parallel_for(static_cast<std::int64_t>(made.size()), context.thread_count(), [&](std::int64_t index, int) {
+    context.throw_if_cancelled();
     const int i = static_cast<int>(index);
     const UtcSeconds time = world.times_utc_s[plan.moving_shadows ? i : 0];
     made[i] = std::make_unique<Light>(outdoor_light(i, time, weather_of(i, plan)));

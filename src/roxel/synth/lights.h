@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "roxel/base/run_context.h"
 #include "roxel/synth/environment.h"
 #include "roxel/synth/world.h"
 
@@ -49,7 +50,7 @@ struct Lights {
   std::vector<int> of_occasion;
 };
 
-/// On at most `threads` threads.
-Lights make_lights(const World& world, const LightPlan& plan, int threads);
+/// On the context's threads; throws Cancelled.
+Lights make_lights(const World& world, const LightPlan& plan, const RunContext& context);
 
 }  // namespace roxel

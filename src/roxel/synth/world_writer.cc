@@ -45,31 +45,27 @@ WorldRequest checked_request(const WorldDefaults& defaults, const SynthOptions& 
   return request;
 }
 
-/// The world, its lights, and what light meets at each occasion.
+/// The world, its lights, and what stands in it at each occasion.
 struct Stage {
   World world;
   Lights lights;
   std::unique_ptr<RayScene> lasting;
-  std::vector<std::unique_ptr<RayScene>> at_occasion;  ///< empty without transients
+  std::vector<TriangleMesh> passing;  ///< at each occasion; empty without transients
   PathOptions path;
 
-  const RayScene& everything(int occasion) const {
-    return at_occasion.empty() ? *lasting : *at_occasion[occasion];
-  }
   const Light& light(int occasion) const { return lights.all[lights.of_occasion[occasion]]; }
 };
 
 Stage set_stage(WorldKind kind, const WorldRequest& request, const SynthOptions& options, LightKind light,
-                int threads) {
+                const RunContext& context) {
   Stage stage;
   stage.world = make_world(kind, request);
   if (options.environment_seen) stage.world.environment_seen = *options.environment_seen;
-  stage.lights = make_lights(stage.world, {light, options.moving_shadows, options.seed}, threads);
+  stage.lights = make_lights(stage.world, {light, options.moving_shadows, options.seed}, context);
   stage.lasting = std::make_unique<RayScene>(stage.world.mesh);
   const int occasions = static_cast<int>(stage.world.times_utc_s.size());
   for (int i = 0; options.transients > 0 && i < occasions; ++i)
-    stage.at_occasion.push_back(std::make_unique<RayScene>(
-        stage.world.mesh, make_transients(stage.world, i, options.transients, options.seed)));
+    stage.passing.push_back(make_transients(stage.world, i, options.transients, options.seed));
   stage.path.samples = options.samples.value_or(world_defaults(kind).samples);
   // With so many paths there is little grain left to smooth.
   constexpr int kPlenty = 64;
@@ -83,7 +79,7 @@ Stage set_stage(WorldKind kind, const WorldRequest& request, const SynthOptions&
 void make_folders(const fs::path& folder, const Stage& stage) {
   std::vector<const char*> names = {"images", "depth", "albedo", "normal", "sky"};
   if (stage.world.masked) names.push_back("mask");
-  if (!stage.at_occasion.empty()) names.push_back("transient");
+  if (!stage.passing.empty()) names.push_back("transient");
   for (const char* name : names) {
     std::error_code error;
     fs::create_directories(folder / name, error);
@@ -96,7 +92,7 @@ void write_pixels(const fs::path& folder, const std::string& name, const Picture
   const bool half = stage.world.high_dynamic_range;
   (half ? writers.half_exr : writers.png)(folder / "images" / (name + (half ? ".exr" : ".png")), picture.rgb);
   if (stage.world.masked) writers.mask(folder / "mask" / (name + ".png"), picture.mask);
-  if (!stage.at_occasion.empty()) writers.mask(folder / "transient" / (name + ".png"), picture.transient);
+  if (!stage.passing.empty()) writers.mask(folder / "transient" / (name + ".png"), picture.transient);
   writers.depth(folder / "depth" / (name + ".exr"), picture.depth);
   writers.half_exr(folder / "albedo" / (name + ".exr"), picture.albedo);
   writers.half_exr(folder / "normal" / (name + ".exr"), picture.normal);
@@ -113,8 +109,12 @@ void write_lights(const fs::path& folder, const Lights& lights, const WorldWrite
 Picture photograph(const Stage& stage, int shot_idx, const SynthOptions& options, const RunContext& context) {
   const Shot& shot = stage.world.shots[shot_idx];
   const Light& light = stage.light(shot.occasion);
-  const PathRenderer renderer(stage.everything(shot.occasion), *stage.lasting, stage.world.materials,
-                              light.environment, stage.path);
+  // Trees of rays with passing things are made when they are wanted: a hundred occasions would fill memory.
+  const auto everything = stage.passing.empty()
+                              ? nullptr
+                              : std::make_unique<RayScene>(stage.world.mesh, stage.passing[shot.occasion]);
+  const PathRenderer renderer(everything ? *everything : *stage.lasting, *stage.lasting,
+                              stage.world.materials, light.environment, stage.path);
   Picture picture = renderer.render(shot.camera, shot_idx, context);
   if (!stage.world.high_dynamic_range)
     for (float& value : picture.rgb.data()) value *= light.exposure;
@@ -152,7 +152,7 @@ SyntheticCameras describe(const Stage& stage, const std::vector<PinholeCamera>& 
   set.image_suffix = world.high_dynamic_range ? ".exr" : ".png";
   set.masked = world.masked;
   set.with_surfaces = true;
-  set.with_transients = !stage.at_occasion.empty();
+  set.with_transients = !stage.passing.empty();
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Shot& shot = world.shots[i];
     const Light& light = stage.light(shot.occasion);
@@ -175,7 +175,7 @@ SynthSummary write_world(const fs::path& folder, WorldKind kind, const SynthOpti
   const WorldRequest request = checked_request(defaults, options);
   const LightKind light = options.light.value_or(defaults.light);
   context.throw_if_cancelled();
-  const Stage stage = set_stage(kind, request, options, light, context.thread_count());
+  const Stage stage = set_stage(kind, request, options, light, context);
   make_folders(folder, stage);
   write_lights(folder, stage.lights, writers);
 

@@ -236,14 +236,14 @@ World outdoors(int occasions) {
 TEST(Lights, AreOneOrAsManyAsOccasions) {
   World indoors = outdoors(3);
   indoors.outdoors = false;
-  const Lights studio_light = make_lights(indoors, {}, 1);
+  const Lights studio_light = make_lights(indoors, {}, RunContext(2));
   ASSERT_EQ(studio_light.all.size(), 1u);
   EXPECT_FALSE(studio_light.all[0].time_utc_s);
-  const Lights noon = make_lights(outdoors(3), {}, 1);
+  const Lights noon = make_lights(outdoors(3), {}, RunContext(2));
   ASSERT_EQ(noon.all.size(), 1u);
   EXPECT_EQ(noon.of_occasion, std::vector<int>({0, 0, 0}));
   EXPECT_TRUE(noon.all[0].time_utc_s);
-  const Lights mixed = make_lights(outdoors(3), {LightKind::kMix, true, 1}, 2);
+  const Lights mixed = make_lights(outdoors(3), {LightKind::kMix, true, 1}, RunContext(2));
   ASSERT_EQ(mixed.all.size(), 3u);
   EXPECT_EQ(mixed.all[0].sky, "clear");
   EXPECT_EQ(mixed.all[1].sky, "overcast");
@@ -253,8 +253,8 @@ TEST(Lights, AreOneOrAsManyAsOccasions) {
 }
 
 TEST(Lights, ShadowsMoveOnlyWhereTheyMay) {
-  const Lights moving = make_lights(outdoors(2), {LightKind::kDaylight, true, 1}, 1);
-  const Lights still = make_lights(outdoors(2), {LightKind::kDaylight, false, 1}, 1);
+  const Lights moving = make_lights(outdoors(2), {LightKind::kDaylight, true, 1}, RunContext(2));
+  const Lights still = make_lights(outdoors(2), {LightKind::kDaylight, false, 1}, RunContext(2));
   const auto sun = [](const Lights& lights, int i) { return lights.all[i].environment.sun(); };
   EXPECT_GT((sun(moving, 0).direction - sun(moving, 1).direction).norm(), 0.1f);
   EXPECT_EQ(sun(still, 0).direction, sun(still, 1).direction);
