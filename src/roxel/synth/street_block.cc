@@ -63,7 +63,7 @@ std::vector<Texture> stuffs(std::uint32_t seed) {
       plaster(0x6a665e, 0x96908a, 13),
       bricks({0xa39a8a, 0x8f8a80, 0xb5ab98, 0x7d7870}, 0.5f, 0.5f, 15),
       bricks({0xb8b0a0, 0xa9a498, 0xc4bcaa}, 0.9f, 0.9f, 17),
-      mottled(0x4a6b22, 0x8f9a55, 3.0f, seed + 19),
+      grained(mottled(0x4a6b22, 0x8f9a55, 3.0f, seed + 19), 0.6f, 0.5f, seed + 60),
       foliage(0x3a2a1c, 0x7d6a52, 0.12f, seed + 20),
       foliage(0x1f3f14, 0x6f9a3a, 0.25f, seed + 21),
       foliage(0x3f4f14, 0xa9a045, 0.25f, seed + 22),
