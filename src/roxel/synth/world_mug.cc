@@ -29,14 +29,9 @@ std::vector<Texture> glazes(std::uint32_t seed) {
     const float around = kRadius * std::atan2(p.y(), p.x());
     return marks(Vector3f(around, 0, p.z()), Vector3f::UnitY());
   };
-  const Texture scales = tiles(
-      {{0xf0e6d0, 0x8fb4c0, 0xd9b070, 0xe0c8c0, 0x9fc0a0}, 0xb0a898, 0.11f, 0.09f, 0.01f, 0.5f}, seed + 50);
-  const Texture bottom = collage(0xf0e6d0, {0x8fb4c0, 0xd9b070, 0x6f8f7a, 0xb5654a}, 0.2f, seed + 51);
-  const Texture hollow = [scales, bottom](const Vector3f& p, const Vector3f& n) {
-    if (std::abs(n.z()) > 0.7f) return bottom(p, n);
-    return scales(Vector3f(kInside * std::atan2(p.y(), p.x()), 0, p.z()), Vector3f::UnitY());
-  };
-  return {outside, grained(uniform_paint(0xd9a441), 0.05f, 0.5f, seed + 40), hollow};
+  const Texture inside = banded({0xf0e6d0, 0x8fb4c0, 0xd9b070, 0xe0c8c0, 0x9fc0a0}, 0.06f, seed + 50);
+  return {outside, grained(uniform_paint(0xd9a441), 0.05f, 0.5f, seed + 40),
+          grained(inside, 0.05f, 0.7f, seed + 51)};
 }
 
 void add_body(MeshBuilder& build) {
