@@ -9,5 +9,6 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/roxelConfigVersion.cmake
 install(EXPORT roxelTargets NAMESPACE roxel:: DESTINATION ${roxel_config_dir})
 install(FILES ${PROJECT_BINARY_DIR}/roxelConfig.cmake ${PROJECT_BINARY_DIR}/roxelConfigVersion.cmake
               ${CMAKE_CURRENT_LIST_DIR}/RoxelVolumeAndImageLibraries.cmake
+              ${CMAKE_CURRENT_LIST_DIR}/RoxelFindNova.cmake
         DESTINATION ${roxel_config_dir})
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

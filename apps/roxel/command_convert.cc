@@ -38,16 +38,6 @@ bool is_bright(const Image& rgb) {
   return std::any_of(rgb.data().begin(), rgb.data().end(), [](float value) { return value > 1.001f; });
 }
 
-std::vector<FloatChannel> rgb_channels(const Image& rgb) {
-  std::vector<FloatChannel> channels;
-  for (int c = 0; c < 3; ++c) {
-    Image plane(rgb.width(), rgb.height(), 1);
-    for (std::size_t i = 0; i < plane.data().size(); ++i) plane.data()[i] = rgb.data()[3 * i + c];
-    channels.push_back({std::string(1, "RGB"[c]), std::move(plane)});
-  }
-  return channels;
-}
-
 /// Writes the view's pixels, and makes the view speak of them: a pinhole, other paths.
 void write_view(const fs::path& folder, const PhotographLoader& load, View& view) {
   const Photograph photo = load(view);

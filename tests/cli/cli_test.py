@@ -106,6 +106,11 @@ class Usage(Case):
             ('"paris"', ["synth", "paris", "-o", out]),
             ("--size", ["synth", "demo", "-o", out, "--size", "64"]),
             ("--images: found", ["synth", "demo", "-o", out, "--images", "1"]),
+            ("images: found 281, expected 2 to 280", ["synth", "street", "-o", out, "--images", "281"]),
+            ("--light: found", ["synth", "plane", "-o", out, "--light", "dark"]),
+            ("--pose-noise: found", ["synth", "plane", "-o", out, "--pose-noise", "1"]),
+            ("--light: found world demo", ["synth", "demo", "-o", out, "--light", "mix"]),
+            ("--transients: found world demo", ["synth", "demo", "-o", out, "--transients", "1"]),
             ("--to: found", ["convert", self.data, "-o", out, "--to", "bundler"]),
             ('--depth: found "maybe"', ["reconstruct", self.data, "-o", out, "--depth=maybe"]),
             ('--dry-run: found "--dry-run="', ["reconstruct", self.data, "-o", out, "--dry-run="]),
@@ -498,6 +503,73 @@ class OtherCommands(Case):
             worlds[name] = {f: digest(out / f) for f in files_below(out)}
         self.assertEqual(worlds["a"], worlds["b"])
         self.assertNotEqual(worlds["a"]["images/000.png"], worlds["c"]["images/000.png"])
+
+
+# What an option of synth changes: files of which folder, and which stay as they were.
+SYNTH_CHANGES = {
+    "background": (["plane"], ["--background", "sky"], "images", "depth"),
+    "images": (["plane"], ["--images", "3"], "transforms.json", None),
+    "light": (["plane"], ["--light", "daylight"], "images", "albedo"),
+    "moving-shadows": (["plane", "--light", "daylight"], ["--no-moving-shadows"], "images", "albedo"),
+    "noise": (["plane"], ["--noise", "0.05"], "images", "depth"),
+    "pose-noise": (["plane"], ["--pose-noise", "0.5,0.01"], "transforms.json", "images"),
+    "samples": (["plane"], ["--samples", "3"], "images", "depth"),
+    "seed": (["plane"], ["--seed", "2"], "images", "depth"),
+    "size": (["plane"], ["--size", "24x20"], "images", "mesh.ply"),
+    "transients": (["plane"], ["--transients", "2"], "images", "depth"),
+}
+
+
+class Synth(Case):
+    """The worlds of `roxel synth`, tiny."""
+
+    def make(self, name, world, *arguments, size="32x24", images=2):
+        out = self.folder / name
+        given = [str(a) for a in arguments]
+        if "--size" not in given: given += ["--size", size]
+        if "--images" not in given: given += ["--images", str(images)]
+        if "--samples" not in given: given += ["--samples", "2"]
+        self.succeed("synth", world, "-o", out, *given, "--quiet")
+        return out
+
+    def test_every_option_changes_what_it_says(self):
+        text = self.succeed("synth", "--help").stdout
+        known = {"threads", "quiet", "verbose", "json", "config", "help"}
+        named = set(re.findall(r"--(?:no-)?([a-z-]+)", text))
+        self.assertEqual(named - known, set(SYNTH_CHANGES) & named)
+        self.assertEqual(set(SYNTH_CHANGES) - named, set())
+        for option, ((world, *base), change, moved, kept) in SYNTH_CHANGES.items():
+            with self.subTest(option):
+                before, after = self.make(option + "-a", world, *base), self.make(option + "-b", world, *base, *change)
+                part = lambda folder, below: {f: d for f, d in digests(folder).items() if f.startswith(below)}
+                self.assertTrue(part(before, moved))
+                self.assertNotEqual(part(before, moved), part(after, moved))
+                if kept: self.assertEqual(part(before, kept), part(after, kept))
+
+    def test_every_world_can_be_read_and_reconstructed(self):
+        for world, nodes in (("plane", 3), ("head", 3), ("mug", 3), ("table", 3), ("flights", 3), ("street", 1)):
+            with self.subTest(world):
+                data = self.make("read-" + world, world, images=3)
+                info = json.loads(self.succeed("info", data, "--json").stdout)
+                self.assertEqual((info["format"], info["images"], info["nodes"]), ("transforms", 3, nodes))
+                self.assertEqual(info["masks"], 0 if world == "table" else 3)
+                self.reconstruct("run-" + world, data=data)
+
+    def test_a_new_world_takes_the_place_of_an_older_one_and_of_nothing_else(self):
+        out = self.make("again", "plane", "--transients", "1", images=3)
+        self.make("again", "table")
+        fresh = self.make("fresh", "table")
+        self.assertEqual(digests(out), digests(fresh))
+        mine = self.folder / "mine"
+        mine.mkdir()
+        (mine / "transforms.json").write_text('{"frames": []}')
+        self.expect_error(2, "did not make", "synth", "plane", "-o", mine)
+        self.assertEqual(files_below(mine), ["transforms.json"])
+
+    def test_json_says_what_was_made(self):
+        made = json.loads(self.succeed("synth", "street", "-o", self.folder / "json", "--images", "21", "--size", "16x16",
+                                       "--samples", "1", "--json").stdout)
+        self.assertEqual((made["world"], made["images"], made["size"], made["occasions"]), ("street", 21, [16, 16], 2))
 
 
 def digests(folder):

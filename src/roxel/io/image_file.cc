@@ -175,11 +175,24 @@ void write_png(const std::string& path, const Mask& mask) {
   write_png_bytes(path, mask.width(), mask.height(), 1, mask.data());
 }
 
-void write_exr(const std::string& path, const std::vector<FloatChannel>& channels) {
+std::vector<FloatChannel> rgb_channels(const Image& rgb) {
+  ROXEL_CHECK_EQ(rgb.channels(), 3);
+  std::vector<FloatChannel> channels;
+  for (int c = 0; c < 3; ++c) {
+    channels.push_back({std::string(1, "RGB"[c]), Image(rgb.width(), rgb.height(), 1)});
+    std::vector<float>& plane = channels.back().plane.data();
+    for (std::size_t p = 0; p < plane.size(); ++p) plane[p] = rgb.data()[3 * p + c];
+  }
+  return channels;
+}
+
+void write_exr(const std::string& path, const std::vector<FloatChannel>& channels, ExrPrecision precision) {
   ROXEL_CHECK(!channels.empty());
   const Image& first = channels.front().plane;
   const std::size_t count = channels.size();
-  OIIO::ImageSpec spec(first.width(), first.height(), static_cast<int>(count), OIIO::TypeFloat);
+  const bool half = precision == ExrPrecision::kHalf;
+  OIIO::ImageSpec spec(first.width(), first.height(), static_cast<int>(count),
+                       half ? OIIO::TypeHalf : OIIO::TypeFloat);
   std::vector<float> values(first.data().size() * count);
   std::set<std::string> names;
   for (std::size_t c = 0; c < count; ++c) {
@@ -191,6 +204,9 @@ void write_exr(const std::string& path, const std::vector<FloatChannel>& channel
     spec.channelnames[c] = channels[c].name;
     for (std::size_t p = 0; p < plane.data().size(); ++p) values[p * count + c] = plane.data()[p];
   }
+  constexpr float kLargestHalf = 65504;
+  if (half)
+    for (float& value : values) value = std::clamp(value, -kLargestHalf, kLargestHalf);
   spec.alpha_channel = -1;  // planes are numbers, not colours: nothing is multiplied by a plane called A
   spec.z_channel = -1;
   spec.attribute("compression", "zip:2");

@@ -51,8 +51,16 @@ struct FloatChannel {
   Image plane;
 };
 
-/// 32-bit float, all planes of one size, at least one; names are unique.
-void write_exr(const std::string& path, const std::vector<FloatChannel>& channels);
+/// How a plane's numbers are kept: 24 significant bits, or 11 and a magnitude up to 65504 (what is above
+/// becomes that).
+enum class ExrPrecision { kFloat, kHalf };
+
+/// All planes of one size, at least one; names are unique.
+void write_exr(const std::string& path, const std::vector<FloatChannel>& channels,
+               ExrPrecision precision = ExrPrecision::kFloat);
+
+/// The channels R, G, B of an image of three.
+std::vector<FloatChannel> rgb_channels(const Image& rgb);
 
 /// Every channel of an EXR (or any float) file, unchanged (NaN included), in the file's order.
 std::vector<FloatChannel> read_exr_channels(const std::string& path);

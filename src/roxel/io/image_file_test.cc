@@ -393,6 +393,22 @@ TEST_F(WriteExr, ChannelsComeBackByNameBitForBit) {
   EXPECT_EQ(find_channel(back, "bp"), nullptr);
 }
 
+TEST_F(WriteExr, HalfKeepsElevenBitsAndHoldsWhatIsTooBright) {
+  Image rgb(2, 1, 3);
+  const std::vector<float> values = {0.1f, 1.0f / 3, 5, 46000, 1e6f, -1e6f};
+  rgb.data() = values;
+  write_exr(path("half.exr"), rgb_channels(rgb), ExrPrecision::kHalf);
+  const auto back = read_exr_channels(path("half.exr"));
+  ASSERT_EQ(back.size(), 3);
+  for (int i = 0; i < 6; ++i) {
+    const Image* plane = find_channel(back, std::string(1, "RGB"[i % 3]));
+    ASSERT_TRUE(plane);
+    const float expected = std::clamp(values[i], -65504.0f, 65504.0f);
+    EXPECT_NEAR(plane->data()[i / 3] / expected, 1, 0.0005) << i;
+  }
+  EXPECT_NE(find_channel(back, "G")->data()[0], values[1]);
+}
+
 TEST_F(WriteExr, SamePixelsGiveTheSameBytes) {
   write_exr(path("a.exr"), {{"Z", Image(9, 7, 1, 0.3f)}});
   write_exr(path("b.exr"), {{"Z", Image(9, 7, 1, 0.3f)}});

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
-#include "roxel/color/color_space.h"
-#include "roxel/synth/demo_files.h"
-#include "roxel/synth/noise.h"
+#include "roxel/synth/dataset_text.h"
+#include "roxel/synth/sparse_points.h"
 
 namespace roxel {
 namespace {
@@ -59,44 +59,17 @@ void add_ring(std::vector<PinholeCamera>& cameras, int count, double elevation_d
   }
 }
 
-std::array<std::uint8_t, 3> display_code(const Vector3f& rgb) {
-  std::array<std::uint8_t, 3> code;
-  for (int c = 0; c < 3; ++c)
-    code[c] = static_cast<std::uint8_t>(std::lround(255 * srgb_encode(std::clamp(rgb[c], 0.0f, 1.0f))));
-  return code;
+std::string photograph_name(int image_idx) {
+  char name[16];
+  std::snprintf(name, sizeof name, "%03d", image_idx);
+  return name;
 }
 
-std::vector<SparsePoint::Observation> observations(const Vector3d& point, const DemoRenderer& renderer,
-                                                   const std::vector<PinholeCamera>& cameras) {
-  std::vector<SparsePoint::Observation> seen;
-  for (int i = 0; i < static_cast<int>(cameras.size()); ++i) {
-    const Intrinsics& k = cameras[i].intrinsics;
-    const Vector3d pixel = cameras[i].project(point);
-    const bool inside =
-        pixel.z() > 0 && pixel.x() > 0 && pixel.y() > 0 && pixel.x() < k.width && pixel.y() < k.height;
-    if (inside && renderer.visible(point.cast<float>(), cameras[i].pose.centre.cast<float>()))
-      seen.push_back({i, pixel.head<2>()});
-  }
-  return seen;
-}
-
-/// Points at random pixels of one image that show a surface.
-std::vector<SparsePoint> points_of_image(int image_idx, int count, const Image& depth,
-                                         const DemoRenderer& renderer,
-                                         const std::vector<PinholeCamera>& cameras, std::uint32_t seed) {
-  std::vector<SparsePoint> points;
-  for (int attempt = 0; attempt < 20 * count && static_cast<int>(points.size()) < count; ++attempt) {
-    const int x = static_cast<int>(lattice_hash(attempt, image_idx, 0, seed) % depth.width());
-    const int y = static_cast<int>(lattice_hash(attempt, image_idx, 1, seed) % depth.height());
-    const float z = *depth.pixel(x, y);
-    if (!(z > 0)) continue;
-    const Ray ray = cameras[image_idx].ray(x + 0.5, y + 0.5);
-    const Vector3d position = ray.origin + z * ray.direction;
-    auto seen = observations(position, renderer, cameras);
-    if (seen.size() < 2) continue;
-    points.push_back({position, display_code(renderer.shade(position.cast<float>())), std::move(seen)});
-  }
-  return points;
+SurfaceQueries queries(const DemoRenderer& renderer) {
+  return {[&](const Vector3d& point, const Vector3d& centre) {
+            return renderer.visible(point.cast<float>(), centre.cast<float>());
+          },
+          [&](const Vector3d& point, int, int) { return renderer.shade(point.cast<float>()); }};
 }
 
 void write_pixels(const fs::path& folder, const std::string& name, const DemoPicture& picture,
@@ -138,7 +111,10 @@ Eigen::AlignedBox3d demo_bounds() {
 
 void write_demo_world(const fs::path& folder, const DemoWorldOptions& options,
                       const DemoWorldWriters& writers, RunContext& context) {
-  const SyntheticCameras set{demo_cameras(options), demo_bounds()};
+  const std::vector<PinholeCamera> cameras = demo_cameras(options);
+  SyntheticCameras set;
+  set.bounds = demo_bounds();
+  for (int i = 0; i < options.images; ++i) set.frames.push_back({photograph_name(i), cameras[i], {}});
   const DemoScene scene(options.seed);
   const DemoRenderer renderer(scene, options.background, options.samples_per_axis);
   make_folders(folder);
@@ -147,11 +123,10 @@ void write_demo_world(const fs::path& folder, const DemoWorldOptions& options,
   std::atomic<int> done{0};
   parallel_for(options.images, context.thread_count(), [&](std::int64_t index, int) {
     const int i = static_cast<int>(index);
-    const DemoPicture picture = renderer.render(set.cameras[i], context);
-    write_pixels(folder, synthetic_name(i), picture, writers);
-    // The rest of the division goes to the first images, so that all are asked for.
-    const int quota = options.points / options.images + (i < options.points % options.images);
-    points[i] = points_of_image(i, quota, picture.depth, renderer, set.cameras, options.seed);
+    const DemoPicture picture = renderer.render(cameras[i], context);
+    write_pixels(folder, set.frames[i].name, picture, writers);
+    points[i] = points_of_image(i, points_asked_of(i, options.images, options.points), picture.depth, cameras,
+                                queries(renderer), options.seed);
     Progress progress;
     progress.stage = "photographs";
     progress.fraction = static_cast<double>(++done) / options.images;
@@ -161,7 +136,7 @@ void write_demo_world(const fs::path& folder, const DemoWorldOptions& options,
   std::vector<SparsePoint> all;
   for (auto& part : points) std::move(part.begin(), part.end(), std::back_inserter(all));
   write_synthetic_colmap(folder, set, all);
-  write_synthetic_transforms(folder, set);
+  write_synthetic_transforms(folder / "transforms.json", set);
 }
 
 }  // namespace roxel

@@ -11,22 +11,6 @@ int floor_int(float x) {
 
 }  // namespace
 
-// Three odd multipliers spread the coordinates, two rounds of multiply and shift mix the bits.
-std::uint32_t lattice_hash(int x, int y, int z, std::uint32_t seed) {
-  std::uint32_t h = seed * 0x9e3779b9u + static_cast<std::uint32_t>(x) * 0x85ebca6bu +
-                    static_cast<std::uint32_t>(y) * 0xc2b2ae35u + static_cast<std::uint32_t>(z) * 0x27d4eb2fu;
-  h ^= h >> 15;
-  h *= 0x2c1b3c6du;
-  h ^= h >> 12;
-  h *= 0x297a2d39u;
-  h ^= h >> 15;
-  return h;
-}
-
-float lattice_random(int x, int y, int z, std::uint32_t seed) {
-  return static_cast<float>(lattice_hash(x, y, z, seed) >> 8) * (1.0f / 16777216.0f);
-}
-
 float value_noise(const Eigen::Vector3f& p, std::uint32_t seed) {
   int cell[3];
   float s[3];

@@ -1,5 +1,7 @@
-#include "roxel/synth/demo_files.h"
+#include "roxel/synth/dataset_text.h"
 
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -47,15 +49,16 @@ std::vector<std::vector<std::pair<int, int>>> seen_by_image(const std::vector<Sp
 }
 
 std::string images_text(const SyntheticCameras& set, const std::vector<SparsePoint>& points) {
-  const auto seen = seen_by_image(points, set.cameras.size());
+  const auto seen = seen_by_image(points, set.frames.size());
   std::string text =
       "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, POINT3D_ID)\n";
-  for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
-    const Pose& pose = set.cameras[i].pose;
+  for (int i = 0; i < static_cast<int>(set.frames.size()); ++i) {
+    const Pose& pose = set.frames[i].camera.pose;
     const Eigen::Quaterniond q(pose.rotation);
     const Eigen::Vector3d t = -(pose.rotation * pose.centre);
-    append(text, "%d %.17g %.17g %.17g %.17g %.17g %.17g %.17g 1 %s.png\n", i + 1, q.w(), q.x(), q.y(), q.z(),
-           t.x(), t.y(), t.z(), synthetic_name(i).c_str());
+    append(text, "%d %.17g %.17g %.17g %.17g %.17g %.17g %.17g 1 ", i + 1, q.w(), q.x(), q.y(), q.z(), t.x(),
+           t.y(), t.z());
+    text += set.frames[i].name + set.image_suffix + "\n";
     for (const auto& [p, o] : seen[i]) {
       const Eigen::Vector2d& pixel = points[p].observations[o].pixel;
       append(text, "%.6f %.6f %d ", pixel.x(), pixel.y(), p + 1);
@@ -79,17 +82,29 @@ std::string points_text(const std::vector<SparsePoint>& points, std::size_t imag
   return text;
 }
 
-}  // namespace
-
-std::string synthetic_name(int image_idx) {
-  std::string text;
-  append(text, "%03d", image_idx);
-  return text;
+ordered_json frame_json(const SyntheticFrame& frame, const SyntheticCameras& set) {
+  const std::string& name = frame.name;
+  ordered_json json{{"file_path", "images/" + name + set.image_suffix}};
+  if (set.masked) json["mask_path"] = "mask/" + name + ".png";
+  json["depth_path"] = "depth/" + name + ".exr";
+  if (set.with_surfaces) {
+    json["albedo_path"] = "albedo/" + name + ".exr";
+    json["normal_path"] = "normal/" + name + ".exr";
+  }
+  if (set.with_transients) json["transient_path"] = "transient/" + name + ".png";
+  if (frame.node) json["node"] = *frame.node;
+  if (!frame.time_utc.empty()) json["time_utc"] = frame.time_utc;
+  if (!frame.sky.empty()) json["sky_path"] = "sky/" + frame.sky + ".exr";
+  json["transform_matrix"] = opengl_matrix(frame.camera.pose);
+  return json;
 }
 
-void write_synthetic_transforms(const std::filesystem::path& folder, const SyntheticCameras& set) {
-  const Intrinsics& k = set.cameras.front().intrinsics;
+}  // namespace
+
+void write_synthetic_transforms(const std::filesystem::path& file, const SyntheticCameras& set) {
+  const Intrinsics& k = set.frames.front().camera.intrinsics;
   ordered_json root;
+  root["generator"] = kSyntheticGenerator;
   root["camera_model"] = "PINHOLE";
   root["w"] = k.width;
   root["h"] = k.height;
@@ -100,23 +115,35 @@ void write_synthetic_transforms(const std::filesystem::path& folder, const Synth
   root["camera_angle_x"] = 2 * std::atan(0.5 * k.width / k.fx);
   const auto corner = [](const Eigen::Vector3d& p) { return ordered_json{p.x(), p.y(), p.z()}; };
   root["scene_bounds"] = {corner(set.bounds.min()), corner(set.bounds.max())};
-  root["frames"] = ordered_json::array();
-  for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
-    const std::string name = synthetic_name(i);
-    root["frames"].push_back({{"file_path", "images/" + name + ".png"},
-                              {"mask_path", "mask/" + name + ".png"},
-                              {"depth_path", "depth/" + name + ".exr"},
-                              {"transform_matrix", opengl_matrix(set.cameras[i].pose)}});
+  if (set.place) {
+    root["latitude"] = set.place->latitude_deg;
+    root["longitude"] = set.place->longitude_deg;
   }
-  write_text_atomically(folder / "transforms.json", root.dump(1) + "\n");
+  root["frames"] = ordered_json::array();
+  for (const SyntheticFrame& frame : set.frames) root["frames"].push_back(frame_json(frame, set));
+  write_text_atomically(file, root.dump(1) + "\n");
 }
 
 void write_synthetic_colmap(const std::filesystem::path& folder, const SyntheticCameras& set,
                             const std::vector<SparsePoint>& points) {
   const std::filesystem::path model = folder / "sparse" / "0";
-  write_text_atomically(model / "cameras.txt", cameras_text(set.cameras.front().intrinsics));
+  write_text_atomically(model / "cameras.txt", cameras_text(set.frames.front().camera.intrinsics));
   write_text_atomically(model / "images.txt", images_text(set, points));
-  write_text_atomically(model / "points3D.txt", points_text(points, set.cameras.size()));
+  write_text_atomically(model / "points3D.txt", points_text(points, set.frames.size()));
+}
+
+std::string utc_text(double time_utc_s) {
+  using namespace std::chrono;
+  const sys_seconds time{seconds{static_cast<std::int64_t>(std::floor(time_utc_s))}};
+  const sys_days day = floor<days>(time);
+  const year_month_day date{day};
+  const hh_mm_ss clock{time - day};
+  std::string text;
+  append(text, "%04d-%02u-%02uT%02d:%02d:%02dZ", static_cast<int>(date.year()),
+         static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+         static_cast<int>(clock.hours().count()), static_cast<int>(clock.minutes().count()),
+         static_cast<int>(clock.seconds().count()));
+  return text;
 }
 
 }  // namespace roxel

@@ -1,0 +1,69 @@
+#include "roxel/synth/illumination_text.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "roxel/synth/dataset_text.h"
+
+namespace roxel {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json triple(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z()}; }
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+ordered_json light_json(const World& world, const Lights& lights, int index) {
+  const Light& light = lights.all[index];
+  const Sun& sun = light.environment.sun();
+  const Eigen::Vector3d d = sun.direction.cast<double>();
+  const double azimuth = std::atan2(d.x(), d.y()) * kDegrees;
+  ordered_json json{{"node", index}};
+  if (world.occasions_are_nodes && lights.all.size() == lights.of_occasion.size())
+    for (const Shot& shot : world.shots)
+      if (shot.occasion == index) {
+        json["center"] = triple(shot.camera.pose.centre.cast<float>());
+        break;
+      }
+  if (light.time_utc_s) {
+    json["time_utc"] = utc_text(*light.time_utc_s);
+    json["lat"] = kWorldLatitudeDeg;
+    json["lon"] = kWorldLongitudeDeg;
+  }
+  json["sky"] = light.sky;
+  json["sun_azimuth_deg"] = azimuth < 0 ? azimuth + 360 : azimuth;
+  json["sun_elevation_deg"] = std::asin(std::clamp(d.z(), -1.0, 1.0)) * kDegrees;
+  json["sun_direction"] = triple(sun.direction);
+  json["sun_disc"] = !sun.irradiance.isZero();
+  json["sun_angular_diameter_deg"] = 2 * sun.angular_radius_rad * kDegrees;
+  json["sun_irradiance_normal_rgb"] = triple(sun.irradiance);
+  json["sky_irradiance_horizontal_rgb"] = triple(light.environment.sky_irradiance());
+  json["total_irradiance_horizontal_rgb"] = triple(light.environment.total_irradiance());
+  json["exposure"] = world.high_dynamic_range ? 1.0f : light.exposure;
+  json["equirect"] = "sky/" + light.name + ".exr";
+  json["equirect_without_disc"] = "sky/" + light.name + "_nosun.exr";
+  return json;
+}
+
+}  // namespace
+
+std::string illumination_json(const World& world, const Lights& lights) {
+  ordered_json root{
+      {"lat", kWorldLatitudeDeg},
+      {"lon", kWorldLongitudeDeg},
+      {"world", "X east, Y north, Z up"},
+      {"azimuth", "degrees clockwise from north (+Y)"},
+      {"elevation", "degrees above the horizon, without refraction"},
+      {"equirect",
+       "row 0 = zenith; centre column = north (+Y); to the right = east (+X); az = (u/W - 0.5)*360, "
+       "el = (0.5 - v/H)*180, pixel centres at +0.5"},
+      {"radiance_units", "linear Rec.709, one factor for all; photographs are radiance times exposure"}};
+  root["nodes"] = ordered_json::array();
+  for (int i = 0; i < static_cast<int>(lights.all.size()); ++i)
+    root["nodes"].push_back(light_json(world, lights, i));
+  return root.dump(1) + "\n";
+}
+
+}  // namespace roxel
