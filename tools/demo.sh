@@ -13,7 +13,7 @@ fi
 
 mkdir -p "$folder"
 echo "== photographs of a synthetic world -> $folder/photographs"
-"$roxel" synth demo -o "$folder/photographs"
+"$roxel" synth head -o "$folder/photographs"
 echo "== reconstruction -> $folder/run"
 "$roxel" reconstruct "$folder/photographs" -o "$folder/run" --resolution 128
 

@@ -49,10 +49,10 @@ OptionTable<TruthOptions> truth_table() {
   table.add("truth", &TruthOptions::truth)
       .help(
           "Folder with depth/NAME.exr (true distance along the optical axis, 0 = no surface), mesh.ply, "
-          "albedo/NAME.exr; "
+          "albedo/NAME.exr, transforms_test.json (held-out views); "
           "what is missing is not measured")
       .placeholder("DIR")
-      .unset("the data set, where it has depth or a mesh");
+      .unset("the data set, where it has any of that");
   table.add("dataset", &TruthOptions::dataset)
       .help("Where the run's photographs and cameras are now")
       .placeholder("DATASET")
@@ -139,10 +139,16 @@ Sources sources_of(const EvalSource& source) {
 
 /// What was asked for by name must give something.
 void check_measured(const EvalOptions& options, const RunMeasures& measures) {
-  if (options.truth.truth && measures.depth.empty() && !measures.volume)
-    throw_invalid("--truth " + *options.truth.truth,
-                  "no depth/NAME.exr for any depth map of " + measures.run + ", and no mesh.ply",
-                  "files named like the images of the run");
+  const bool by_truth = !measures.depth.empty() || measures.volume || !measures.surfaces.empty() ||
+                        measures.color || !measures.held_out.empty();
+  if (options.truth.truth && !by_truth) {
+    std::string found = "nothing to measure " + measures.run + " by";
+    for (const std::string& note : measures.notes) found += "; " + note;
+    throw_invalid(
+        "--truth " + *options.truth.truth, found,
+        "depth/NAME.exr or albedo/NAME.exr named like the images of the run, mesh.ply with a surface "
+        "in its box, or transforms_test.json");
+  }
   if (measures.empty())
     throw_invalid(measures.run, "neither truth nor renders to measure by",
                   "--truth DIR, or a run with renders");
@@ -183,6 +189,26 @@ std::string report_page(const EvalSource& source, const RunMeasures& measures) {
   return html_report(content);
 }
 
+void remove_file(const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::is_directory(fs::symlink_status(file, ignored))) fs::remove(file, ignored);
+}
+
+/// The files of an earlier eval, metrics.json first, so that measures of two never mix. Does nothing where
+/// there is no metrics.json.
+void remove_older(const fs::path& folder) {
+  if (!fs::is_regular_file(folder / "metrics.json")) return;
+  for (const char* name : {"metrics.json", "report.html", "section_x.svg", "section_y.svg", "section_z.svg"})
+    remove_file(folder / name);
+  for (const char* name : {"depth", "depth_error_over_sigma", "opacity_reliability", "surfaces",
+                           "voxel_distances", "voxel_opacities", "images", "held_out"})
+    for (const char* suffix : {".csv", ".svg"}) remove_file(folder / (std::string(name) + suffix));
+  const auto surface_plot = [&](int number) {
+    return folder / ("surface_" + std::to_string(number) + ".svg");
+  };
+  for (int i = 1; fs::exists(surface_plot(i)); ++i) remove_file(surface_plot(i));
+}
+
 void write_files(const fs::path& folder, const EvalSource& source, const RunMeasures& measures,
                  const std::string& json) {
   for (const auto& [name, table] : csv_tables(measures)) write_text_atomically(folder / name, table);
@@ -212,7 +238,7 @@ int run_eval(const Invocation& invocation, const EvalOptions& options) {
   if (folder) {
     PartialResults partial(folder->path());
     write_files(partial.path(), source, measures, json);
-    partial.publish();
+    partial.publish([&] { remove_older(folder->path()); });
   }
   session.display().clear();
   print_result(options.common, to_text(measures), json);

@@ -155,28 +155,55 @@ nlohmann::json older_data_set(const fs::path& folder) {
   return in ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
 }
 
+/// What a data set of this command consists of, besides transforms.json.
+constexpr const char* kParts[] = {"images", "mask",   "depth",     "albedo",   "normal",
+                                  "sky",    "sparse", "transient", "mesh.ply", "illumination.json"};
+
 /// Only what this command has made may be replaced: photographs cannot be made again.
 void check_older(const fs::path& folder) {
-  if (!fs::exists(folder / "transforms.json")) return;
   const nlohmann::json older = older_data_set(folder);
   if (older.is_object() && older.value("generator", nlohmann::json()) == kSyntheticGenerator) return;
-  throw_invalid(folder.string(), "a data set that roxel synth did not make", "another folder");
+  const bool taken = fs::exists(folder / "transforms.json") ||
+                     std::any_of(std::begin(kParts), std::end(kParts),
+                                 [&](const char* part) { return fs::exists(folder / part); });
+  if (taken) throw_invalid(folder.string(), "files that roxel synth did not make", "another folder");
+}
+
+/// Removes a file that an older data set names, and the folder that it leaves empty.
+void remove_named(const fs::path& folder, const nlohmann::json& name) {
+  if (!name.is_string()) return;
+  const fs::path path = fs::path(name.get<std::string>()).lexically_normal();
+  if (path.empty() || !path.is_relative() || *path.begin() == "..") return;
+  std::error_code ignored;
+  fs::remove(folder / path, ignored);
+  const fs::path above = (folder / path).parent_path();
+  if (above != folder && fs::is_empty(above, ignored)) fs::remove(above, ignored);
 }
 
 /// Files of an older synthetic data set, so that none is left over beside the new one.
 void remove_older(const fs::path& folder) {
   const nlohmann::json older = older_data_set(folder);
-  std::error_code ignored;
-  if (!older.is_object() || !older.contains("frames")) return;
-  for (const auto& frame : older["frames"])
-    for (const auto& [key, value] : frame.items()) {
-      const bool file = key.ends_with("_path") && value.is_string();
-      if (!file) continue;
-      const fs::path path = fs::path(value.get<std::string>()).lexically_normal();
-      if (path.is_relative() && *path.begin() != "..") fs::remove(folder / path, ignored);
-    }
+  std::ifstream in(folder / "illumination.json");
+  const nlohmann::json light = in ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
+  if (older.is_object() && older.contains("frames"))
+    for (const auto& frame : older["frames"])
+      for (const auto& [key, value] : frame.items())
+        if (key.ends_with("_path")) remove_named(folder, value);
+  if (light.is_object() && light.contains("nodes"))
+    for (const auto& node : light["nodes"])
+      for (const char* map : {"equirect", "equirect_without_disc"})
+        if (node.contains(map)) remove_named(folder, node[map]);
   for (const char* name : {"transforms.json", "transforms_true.json", "illumination.json", "mesh.ply"})
-    fs::remove(folder / name, ignored);
+    remove_named(folder, name);
+}
+
+/// Options that would do nothing in this world are errors.
+void refuse_without_effect(const CommandOptions& options, WorldKind world) {
+  const LightKind light = options.world.light.value_or(world_defaults(world).light);
+  if (!options.world.moving_shadows && light == LightKind::kConstant)
+    throw_invalid("--no-moving-shadows", "constant light", "--light daylight, overcast or mix");
+  if (options.background != BackgroundChoice::kAuto && world == WorldKind::kTable)
+    throw_invalid("--background", "world table", "another world; the room hides what is behind it");
 }
 
 int run_demo(const Invocation& invocation, const CommandOptions& options, const fs::path& folder,
@@ -213,7 +240,10 @@ int run_synth(const Invocation& invocation, const CommandOptions& given) {
   options.world.light = light_kind(options.light);
 
   Session session(options.common);
-  if (!world) refuse_for_demo(options);
+  if (world)
+    refuse_without_effect(options, *world);
+  else
+    refuse_for_demo(options);
   check_older(invocation.output);
   const OutputFolder folder(invocation.output);
   if (!world) return run_demo(invocation, options, folder.path(), session);

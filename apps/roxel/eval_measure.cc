@@ -93,9 +93,12 @@ class Measurement {
     const nlohmann::json& summary = source_.run.summary;
     if (const auto rms = summary.find("reprojection_rms_percent"); rms != summary.end() && rms->is_number())
       out_.reprojection_rms_percent = rms->get<double>();
-    for (const auto& view : summary.value("views", nlohmann::json::array()))
-      if (const auto rms = view.find("reprojection_rms_percent"); rms != view.end() && rms->is_number())
-        out_.reprojection.emplace_back(view.value("name", ""), rms->get<double>());
+    read_from_summary(source_.run.path, [&] {
+      for (const auto& view : summary.value("views", nlohmann::json::array()))
+        if (const auto found = view.find("reprojection_rms_percent");
+            found != view.end() && found->is_number())
+          out_.reprojection.emplace_back(view.value("name", ""), found->get<double>());
+    });
   }
 
   void draw_samples() {
@@ -123,7 +126,15 @@ class Measurement {
       if (!out_.opacity_reliability) out_.opacity_reliability.emplace();
       out_.opacity_reliability->add(*view.reliability);
     }
+    if (out_.depth.empty()) note_unmatched("depth", "depth map");
     keep_seen_samples();
+  }
+
+  /// Truth that is there and goes with nothing of the run.
+  void note_unmatched(const std::string& folder, const std::string& what) {
+    if (source_.truth && fs::is_directory(*source_.truth / folder))
+      out_.notes.push_back("no NAME.exr in " + (*source_.truth / folder).string() + " for any " + what +
+                           " of the run");
   }
 
   MeasuredView measure_view(const std::string& name) {
@@ -235,7 +246,7 @@ class Measurement {
     const double cell = out_.voxel_size / 2;
     if (!estimates_.empty()) {
       add_points("depth points", one_point_a_cell(depth_points(estimates_, {}, threads_), cell));
-      const DepthPointOptions agreeing{options_.views_agree, 2 * out_.voxel_size};
+      const DepthPointOptions agreeing{options_.views_agree, out_.voxel_size};
       add_points("depth points that " + std::to_string(options_.views_agree) + " views agree on",
                  one_point_a_cell(depth_points(estimates_, agreeing, threads_), cell));
     }
@@ -309,30 +320,26 @@ class Measurement {
       views.emplace_back(view, *file);
       pixels += static_cast<std::size_t>(view->camera.intrinsics.width) * view->camera.intrinsics.height;
     }
-    if (views.empty()) return;
+    if (views.empty()) return note_unmatched("albedo", "image with a known camera");
+    const RunRenderer alone(source_.run, {std::array<double, 3>{0, 0, 0}, false});
     std::vector<ColorPair> pairs;
     const std::size_t stride = 1 + pixels / kMostColorPixels;
-    for (const auto& [view, file] : views) add_color_pairs(*view, file, stride, pairs);
-    out_.color = color_accuracy(pairs);
+    for (const auto& [view, file] : views) add_color_pairs(alone, *view, file, stride, pairs);
+    out_.color = color_accuracy(std::move(pairs));
   }
 
-  void add_color_pairs(const View& view, const fs::path& file, std::size_t stride,
+  /// `alone` shows the box over black: no background or surround is taken for the object's colour.
+  void add_color_pairs(const RunRenderer& alone, const View& view, const fs::path& file, std::size_t stride,
                        std::vector<ColorPair>& pairs) {
     session_.context().throw_if_cancelled();
     const Image albedo = read_image(file.string(), kAsItIs).rgb;
-    const Rendering rendering = renderer()(view, session_.context());
+    const Rendering rendering = alone(view, session_.context());
     check_size(file, albedo, rendering.rgb.width(), rendering.rgb.height(), view.source);
     for (std::size_t i = 0; i < rendering.opacity.data().size(); i += stride) {
       const float opacity = rendering.opacity.data()[i];
       if (!(opacity > kHasDepth)) continue;
-      ColorPair pair;
-      bool finite = true;
-      for (int c = 0; c < 3; ++c) {
-        pair.estimate[c] = rendering.rgb.data()[3 * i + c];
-        pair.truth[c] = albedo.data()[3 * i + c];
-        finite = finite && std::isfinite(pair.estimate[c]) && std::isfinite(pair.truth[c]);
-      }
-      if (finite) pairs.push_back(pair);
+      if (const auto pair = color_pair(&rendering.rgb.data()[3 * i], opacity, &albedo.data()[3 * i]))
+        pairs.push_back(*pair);
     }
   }
 

@@ -15,12 +15,16 @@ std::vector<std::string> names_of_views(const FinishedRun& run) {
   return names;
 }
 
-/// The bounds of the summary, or the box of the lattice where it has none (merged runs).
+/// The bounds of the summary, or the box of the lattice where it has none.
 Eigen::AlignedBox3d box_of(const FinishedRun& run) {
   const nlohmann::json bounds =
-      run.summary.value("scene", nlohmann::json::object()).value("bounds", nlohmann::json::array());
-  if (!bounds.is_array() || bounds.size() != 6) return run.file.volume.index(0).frame().box();
+      run.summary.value("scene", nlohmann::json::object()).value("bounds", nlohmann::json());
+  if (bounds.is_null()) return run.file.volume.index(0).frame().box();
   const auto v = bounds.get<std::vector<double>>();
+  const bool fits = v.size() == 6 && v[0] < v[3] && v[1] < v[4] && v[2] < v[5];
+  if (!fits)
+    throw_invalid((run.path / "summary.json").string() + ": scene.bounds", bounds.dump(),
+                  "six numbers, the first corner below the second");
   return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
 }
 
@@ -59,8 +63,10 @@ void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSou
 std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& source) {
   if (paths.truth) {
     if (!has_truth(*paths.truth))
-      throw_invalid("--truth " + *paths.truth, "no folder depth and no mesh.ply in it",
-                    "depth/NAME.exr for the images of the run, or mesh.ply");
+      throw_invalid(
+          "--truth " + *paths.truth,
+          "no folder depth or albedo, no mesh.ply and no transforms_test.json in it",
+          "depth/NAME.exr or albedo/NAME.exr for the images of the run, mesh.ply, or held-out views");
     return *paths.truth;
   }
   const fs::path dataset = paths.dataset.value_or(source.run.file.info.dataset);
@@ -105,7 +111,8 @@ Response EvalSource::picture_response() const {
 }
 
 bool has_truth(const fs::path& folder) {
-  return fs::is_directory(folder / "depth") || fs::is_regular_file(folder / "mesh.ply");
+  return fs::is_directory(folder / "depth") || fs::is_directory(folder / "albedo") ||
+         fs::is_regular_file(folder / "mesh.ply") || fs::is_regular_file(folder / "transforms_test.json");
 }
 
 std::optional<fs::path> truth_file(const fs::path& truth, const std::string& kind, const std::string& name) {
@@ -120,8 +127,10 @@ EvalSource read_eval_source(const EvalPaths& paths, const Session& session) {
   EvalSource source;
   source.run = read_run(paths.run);
   session.context().throw_if_cancelled();
-  source.view_names = names_of_views(source.run);
-  source.box = box_of(source.run);
+  read_from_summary(source.run.path, [&] {
+    source.view_names = names_of_views(source.run);
+    source.box = box_of(source.run);
+  });
   read_dataset_of_run(paths, session, source);
   source.truth = truth_folder(paths, source);
   read_surfaces(paths, source);

@@ -38,7 +38,7 @@ struct EvalSource {
   Response picture_response() const;
 };
 
-/// A folder with true depth or a true mesh in it.
+/// A folder with true depth, a true mesh, true colours or held-out views in it.
 bool has_truth(const std::filesystem::path& folder);
 
 /// TRUTH/KIND/NAME.exr by the view's name, or by its file name alone; none where there is no such file.

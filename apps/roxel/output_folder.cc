@@ -127,8 +127,10 @@ std::vector<fs::path> PartialResults::files() const {
   std::vector<fs::path> found;
   for (const auto& entry : fs::recursive_directory_iterator(path_))
     if (!entry.is_directory()) found.push_back(entry.path().lexically_relative(path_));
-  std::stable_partition(found.begin(), found.end(),
-                        [](const fs::path& file) { return file != "summary.json"; });
+  // Last come the files by which a folder is known, so that one which has them is complete.
+  std::stable_partition(found.begin(), found.end(), [](const fs::path& file) {
+    return file != "summary.json" && file != "transforms.json" && file != "metrics.json";
+  });
   return found;
 }
 
@@ -142,7 +144,10 @@ void PartialResults::publish(const std::function<void()>& remove_older) {
     if (fs::is_directory(to)) throw IoError(to.string() + ": cannot be written (it is a folder)");
   }
   remove_older();
-  for (const fs::path& name : names) move_file(path_ / name, target_ / name);
+  for (const fs::path& name : names) {
+    fs::create_directories((target_ / name).parent_path());  // where it went with the older files
+    move_file(path_ / name, target_ / name);
+  }
 }
 
 }  // namespace roxel::cli

@@ -24,7 +24,7 @@ std::array<float, 3> background(const FinishedRun& run, const RunRendererOptions
 
 RunRenderer::RunRenderer(const FinishedRun& run, const RunRendererOptions& options)
     : stack_(run.file.volume), colors_(radiance_colors(run.file.volume, run.file.info.colors, 1)) {
-  options_.background = background(run, options);
+  options_.background = read_from_summary(run.path, [&] { return background(run, options); });
   options_.surround = options.surround;
 }
 

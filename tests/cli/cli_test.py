@@ -560,11 +560,37 @@ class Synth(Case):
         self.make("again", "table")
         fresh = self.make("fresh", "table")
         self.assertEqual(digests(out), digests(fresh))
+        square = self.make("square", "street", images=21, size="16x16")
+        self.make("square", "table")
+        self.assertEqual(digests(square), digests(fresh))
+        self.assertFalse((square / "mask").exists())
         mine = self.folder / "mine"
         mine.mkdir()
         (mine / "transforms.json").write_text('{"frames": []}')
         self.expect_error(2, "did not make", "synth", "plane", "-o", mine)
         self.assertEqual(files_below(mine), ["transforms.json"])
+        photographs = self.folder / "photographs"
+        (photographs / "images").mkdir(parents=True)
+        (photographs / "images" / "000.png").write_text("mine")
+        self.expect_error(2, "did not make", "synth", "plane", "-o", photographs)
+        self.assertEqual((photographs / "images" / "000.png").read_text(), "mine")
+
+    def test_options_without_effect_are_refused(self):
+        for world, option in (("plane", ["--no-moving-shadows"]), ("street", ["--light", "constant", "--no-moving-shadows"]),
+                              ("table", ["--background", "black"])):
+            self.expect_error(2, option[-1].lstrip("-") if option[-1] != "black" else "background", "synth", world,
+                              "-o", self.folder / "none", *option)
+
+    def test_every_node_has_its_light(self):
+        for light in ("constant", "mix"):
+            street = self.make("street-" + light, "street", "--light", light, images=41, size="16x16")
+            nodes = json.loads((street / "illumination.json").read_text())["nodes"]
+            frames = json.loads((street / "transforms.json").read_text())["frames"]
+            self.assertEqual([n["node"] for n in nodes], sorted({f["node"] for f in frames}))
+            for node in nodes:
+                self.assertEqual(len(node["center"]), 3)
+                self.assertTrue((street / node["equirect"]).is_file())
+                self.assertTrue((street / node["equirect_without_disc"]).is_file())
 
     def test_json_says_what_was_made(self):
         made = json.loads(self.succeed("synth", "street", "-o", self.folder / "json", "--images", "21", "--size", "16x16",

@@ -31,6 +31,25 @@ def ply(corners=CORNERS, squares=SQUARES):
     return text + "".join("4 %d %d %d %d\n" % square for square in squares)
 
 
+def exr(planes, width=64, height=48):
+    """An OpenEXR file without compression: channels of floats by name, each a function of x and y."""
+    def attribute(name, kind, value):
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+
+    names = sorted(planes)
+    channels = b"".join(name.encode() + b"\0" + struct.pack("<iB3xii", 2, 0, 1, 1) for name in names) + b"\0"
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    head = struct.pack("<ii", 20000630, 2) + attribute("channels", "chlist", channels) + attribute("compression", "compression", b"\0")
+    head += attribute("dataWindow", "box2i", window) + attribute("displayWindow", "box2i", window)
+    head += attribute("lineOrder", "lineOrder", b"\0") + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+    head += attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)) + attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0"
+    line = 4 * width * len(names)
+    lines = [struct.pack("<ii", y, line) + struct.pack(f"<{width * len(names)}f", *(planes[n](x, y) for n in names for x in range(width)))
+             for y in range(height)]
+    first = len(head) + 8 * height
+    return head + struct.pack(f"<{height}q", *(first + y * (8 + line) for y in range(height))) + b"".join(lines)
+
+
 class EvalCase(cli_test.Case):
     """A run with its data set, and a truth that has a mesh alone."""
 
@@ -43,6 +62,32 @@ class EvalCase(cli_test.Case):
         cls.mesh = cls.folder / "mesh"
         cls.mesh.mkdir()
         (cls.mesh / "mesh.ply").write_text(ply())
+
+    def albedo(self, name):
+        """A truth that has colours alone: grey everywhere."""
+        folder = self.folder / name
+        (folder / "albedo").mkdir(parents=True)
+        (folder / "albedo/000.exr").write_bytes(exr({c: lambda x, y: 0.5 for c in "RGB"}))
+        return folder
+
+    def held_out(self, name):
+        """A truth that has one held-out view alone."""
+        folder = self.folder / name
+        folder.mkdir()
+        for kind in ("images", "mask"):
+            shutil.copytree(self.data / kind, folder / kind)
+        cameras = json.loads((self.data / "transforms.json").read_text())
+        (folder / "transforms_test.json").write_text(json.dumps({**cameras, "frames": cameras["frames"][:1]}))
+        return folder
+
+    def changed_run(self, name, change):
+        """A copy of the run whose summary is no longer what it was."""
+        folder = self.folder / name
+        shutil.copytree(self.run_folder, folder)
+        summary = json.loads((folder / "summary.json").read_text())
+        change(summary)
+        (folder / "summary.json").write_text(json.dumps(summary))
+        return folder
 
     def measures(self, *arguments, run=None):
         return json.loads(self.succeed("eval", run or self.run_folder, *arguments, "--json").stdout)
@@ -116,6 +161,79 @@ class Measures(EvalCase):
         self.assertEqual(found["share_within_voxels"]["0.5"], found["share_found"])
         self.assertGreater(found["share_found"], 0.3)
         self.assertEqual(found["bias_voxels"], 0)
+
+    def test_colours_alone_are_truth(self):
+        found = self.measures("--truth", self.albedo("albedo-alone"))
+        self.assertGreater(found["color"]["pixels"], 100)
+        self.assertIsNone(found["depth"])
+
+    def test_a_background_is_no_colour_of_the_object(self):
+        truth = self.albedo("albedo-red")
+        red = {"kind": "constant", "color": [1, 0, 0]}
+        on_red = self.changed_run("on-red", lambda summary: summary["scene"].update(background=red))
+        self.assertEqual(self.measures("--truth", truth, run=on_red)["color"], self.measures("--truth", truth)["color"])
+
+    def test_held_out_views_alone_are_truth(self):
+        found = self.measures("--truth", self.held_out("held-out-alone"))
+        self.assertEqual([v["name"] for v in found["held_out"]["views"]], ["000"])
+
+    def test_depths_a_voxel_and_a_half_apart_do_not_agree(self):
+        # Two views from one place, whose depth maps are planes; nothing else has depth.
+        data, run = self.folder / "one-place", self.folder / "planes"
+        shutil.copytree(self.data, data)
+        shutil.rmtree(data / "sparse")
+        cameras = json.loads((data / "transforms.json").read_text())
+        pose = cameras["frames"][0]["transform_matrix"]
+        cameras["frames"][1]["transform_matrix"] = pose
+        (data / "transforms.json").write_text(json.dumps(cameras))
+        shutil.copytree(self.run_folder, run)
+        shutil.rmtree(run / "depth")
+        (run / "depth").mkdir()
+        voxel = json.loads((run / "summary.json").read_text())["scene"]["voxel_size"]
+        middle = sum(row[3] ** 2 for row in pose[:3]) ** 0.5
+
+        def points(apart):
+            for name, z in (("000", middle), ("001", middle + apart * voxel)):
+                planes = {"Z": lambda x, y: z, "V": lambda x, y: 0.01, "A": lambda x, y: 1}
+                (run / f"depth/{name}.exr").write_bytes(exr(planes))
+            return self.measures("--truth", self.mesh, "--dataset", data, run=run)["surfaces"]
+
+        every, agreed, _ = points(0.5)
+        self.assertEqual(agreed["points"], every["points"])
+        every, agreed, _ = points(1.5)
+        self.assertGreater(every["points"], 100)
+        self.assertEqual((agreed["points"], agreed["accuracy_90"]), (0, None))
+
+    def test_older_measures_are_removed_and_nothing_else(self):
+        full = self.held_out("full-before")
+        for kind in ("depth", "mesh.ply"):
+            source = self.data / kind if kind == "depth" else self.mesh / kind
+            (shutil.copytree if source.is_dir() else shutil.copy)(source, full / kind)
+        blind = self.changed_run("blind", lambda summary: None)
+        shutil.rmtree(blind / "render")
+        out, fresh = self.folder / "again", self.folder / "fresh"
+        self.succeed("eval", self.run_folder, "--truth", full, "--estimate", full / "mesh.ply", "-o", out, "--quiet")
+        for name in ("surface_4.svg", "held_out.csv", "images.svg", "depth.csv"):
+            self.assertIn(name, files_below(out))
+        (out / "mine.csv").write_text("kept")
+        (out / "images").mkdir()
+        self.succeed("eval", blind, "--truth", self.albedo("albedo-again"), "-o", out, "--quiet")
+        self.succeed("eval", blind, "--truth", self.folder / "albedo-again", "-o", fresh, "--quiet")
+        self.assertEqual(files_below(out), sorted([*files_below(fresh), "mine.csv"]))
+        self.assertTrue((out / "images").is_dir())
+
+    def test_files_that_no_eval_wrote_are_kept(self):
+        out = self.folder / "not-measures"
+        out.mkdir()
+        (out / "held_out.csv").write_text("kept")
+        self.succeed("eval", self.run_folder, "-o", out, "--quiet")
+        self.assertEqual((out / "held_out.csv").read_text(), "kept")
+
+    def test_passes_without_a_figure_leave_a_gap(self):
+        for name, passes in (("no-list", 5), ("null", [{"level": 1, "mean_log_likelihood": None}, {"level": 1, "mean_log_likelihood": -1}])):
+            with self.subTest(name):
+                run = self.changed_run(f"passes-{name}", lambda summary: summary.update(passes=passes))
+                self.succeed("eval", run, "-o", self.folder / f"page-{name}", "--quiet")
 
     def test_truth_displaced_is_off_by_as_much(self):
         moved = self.folder / "moved.ply"
@@ -212,6 +330,30 @@ class BadTruth(EvalCase):
         self.expect_error(2, "no true surface", "eval", self.run_folder, "--estimate", self.mesh / "mesh.ply")
         self.expect_error(2, "missing.ply", "eval", self.run_folder, "--truth", self.mesh, "--estimate", bad / "missing.ply")
         self.expect_error(2, "nowhere", "eval", self.run_folder, "--dataset", self.folder / "nowhere")
+
+    def test_truth_that_gives_nothing_says_why(self):
+        aside = self.folder / "aside"
+        aside.mkdir()
+        (aside / "mesh.ply").write_text(ply([(x + 50, y, z) for x, y, z in CORNERS]))
+        done = self.expect_error(2, "is in the run's box", "eval", self.run_folder, "--truth", aside, "--quiet")
+        self.assertNotIn("no mesh.ply", done.stderr)
+        (aside / "mesh.ply").unlink()
+        (aside / "albedo").mkdir()
+        self.expect_error(2, "no NAME.exr in " + str(aside / "albedo"), "eval", self.run_folder, "--truth", aside, "--quiet")
+
+    def test_a_damaged_summary_ends_with_code_2(self):
+        def with_value(key, value):
+            return lambda summary: summary.update({key: value})
+
+        table = {"views": with_value("views", [5]), "scene": with_value("scene", None), "name": with_value("views", [{"name": 7}]),
+                 "nulls": lambda summary: summary["scene"].update(bounds=[None] * 6),
+                 "order": lambda summary: summary["scene"].update(bounds=[0, 0, 0, 1, -1, 1]),
+                 "background": lambda summary: summary["scene"].update(background=5)}
+        truth = self.held_out("held-out-damaged")
+        for name, change in table.items():
+            with self.subTest(name):
+                run = self.changed_run(f"damaged-{name}", change)
+                self.expect_error(2, str(run / "summary.json"), "eval", run, "--truth", truth, "--quiet")
 
     def test_a_full_disc_leaves_older_measures(self):
         out = self.folder / "older"

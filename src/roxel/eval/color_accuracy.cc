@@ -43,12 +43,23 @@ double mean(const std::vector<double>& values) {
 
 }  // namespace
 
-ColorAccuracy color_accuracy(const std::vector<ColorPair>& pairs) {
+std::optional<ColorPair> color_pair(const float* over_black, float opacity, const float* truth) {
+  ColorPair pair;
+  bool finite = opacity > 0;
+  for (int c = 0; c < 3; ++c) {
+    pair.estimate[c] = over_black[c] / opacity;
+    pair.truth[c] = truth[c];
+    finite = finite && std::isfinite(pair.estimate[c]) && std::isfinite(pair.truth[c]);
+  }
+  return finite ? std::optional(pair) : std::nullopt;
+}
+
+ColorAccuracy color_accuracy(std::vector<ColorPair> pairs) {
+  std::erase_if(pairs, [](const ColorPair& pair) { return !(dot(pair.truth, pair.truth) > 0); });
   ColorAccuracy accuracy;
   accuracy.scale = best_scale(pairs);
   std::vector<double> differences, relative;
   for (const ColorPair& pair : pairs) {
-    if (!(dot(pair.truth, pair.truth) > 0)) continue;
     differences.push_back(delta_e_2000(lab_of(pair.estimate, accuracy.scale), lab_of(pair.truth, 1)));
     relative.push_back(relative_error(pair, accuracy.scale));
   }

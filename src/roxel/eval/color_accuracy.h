@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace roxel {
@@ -24,7 +25,12 @@ struct ColorAccuracy {
   double median_relative = 0;
 };
 
-/// Pairs whose truth is black are left out: a relative error means nothing there. All 0 without pairs.
-ColorAccuracy color_accuracy(const std::vector<ColorPair>& pairs);
+/// The colour of what a pixel rendered over black shows, however much of the pixel it fills, beside the
+/// truth; none where one is not finite. Both are linear RGB.
+std::optional<ColorPair> color_pair(const float* over_black, float opacity, const float* truth);
+
+/// Pairs whose truth is black are left out, of the scale too: a relative error means nothing there. All 0
+/// and a scale of 1 without pairs.
+ColorAccuracy color_accuracy(std::vector<ColorPair> pairs);
 
 }  // namespace roxel

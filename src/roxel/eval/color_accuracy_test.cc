@@ -41,5 +41,34 @@ TEST(ColorAccuracy, BlackTruthIsLeftOut) {
   EXPECT_EQ(color_accuracy({}).mean_delta_e, 0);
 }
 
+TEST(ColorAccuracy, BlackTruthDoesNotMoveTheScale) {
+  const std::vector<ColorPair> good{{{0.2f, 0.4f, 0.6f}, {0.1f, 0.2f, 0.3f}},
+                                    {{0.8f, 0.1f, 0.2f}, {0.4f, 0.05f, 0.1f}}};
+  std::vector<ColorPair> with_black = good;
+  with_black.push_back({{0.9f, 0.9f, 0.9f}, {0, 0, 0}});
+  const ColorAccuracy found = color_accuracy(with_black);
+  EXPECT_EQ(found.pixels, 2);
+  EXPECT_NEAR(found.scale, 0.5, 1e-7);
+  EXPECT_NEAR(found.mean_relative, 0, 1e-6);
+}
+
+TEST(ColorPair, HalfFilledPixelsAreNotDarker) {
+  const float over_black[3] = {0.3f, 0.15f, 0}, truth[3] = {0.5f, 0.25f, 0.1f};
+  const auto pair = color_pair(over_black, 0.6f, truth);
+  ASSERT_TRUE(pair);
+  EXPECT_NEAR(pair->estimate[0], 0.5, 1e-6);
+  EXPECT_NEAR(pair->estimate[1], 0.25, 1e-6);
+  EXPECT_EQ(pair->estimate[2], 0);
+  EXPECT_EQ(pair->truth[1], 0.25f);
+}
+
+TEST(ColorPair, NoneWhereAColourIsUnknown) {
+  const float grey[3] = {0.5f, 0.5f, 0.5f}, unknown[3] = {0.5f, NAN, 0.5f};
+  EXPECT_TRUE(color_pair(grey, 1, grey));
+  EXPECT_FALSE(color_pair(grey, 1, unknown));
+  EXPECT_FALSE(color_pair(unknown, 1, grey));
+  EXPECT_FALSE(color_pair(grey, 0, grey));
+}
+
 }  // namespace
 }  // namespace roxel

@@ -23,7 +23,16 @@ void check(const EstimatedDepth& estimate, std::span<const float> truth,
   ROXEL_CHECK(std::is_sorted(options.thresholds.begin(), options.thresholds.end()));
 }
 
-/// Errors are compared in doubles; a float depth carries 6e-8, far below any voxel.
+/// Of |error| / sigma: no error is within any deviation, and any error is infinitely far beyond none.
+std::size_t normalized_bin(double error, double sigma, std::size_t bins) {
+  if (error == 0) return 0;
+  const double last = static_cast<double>(bins - 1);
+  const double bin = sigma > 0 ? std::ceil(error / sigma * DepthAccuracy::kBinsPerSigma) - 1 : last;
+  return static_cast<std::size_t>(std::clamp(bin, 0.0, last));
+}
+
+/// Errors are compared in doubles; a float depth carries 6e-8, far below any voxel. A sigma of NaN is not
+/// known.
 void count_found(DepthAccuracy& sums, double error_voxels, double sigma_voxels, double voxel_size) {
   ++sums.found_pixels;
   const double distance = std::abs(error_voxels);
@@ -34,11 +43,9 @@ void count_found(DepthAccuracy& sums, double error_voxels, double sigma_voxels, 
     ++sums.bias_pixels;
     sums.signed_error_voxels += error_voxels;
   }
-  if (!(sigma_voxels > 0)) return;
+  if (!(sigma_voxels >= 0)) return;
   ++sums.calibrated_pixels;
-  const double bins = std::ceil(distance / sigma_voxels * DepthAccuracy::kBinsPerSigma) - 1;
-  const double last = static_cast<double>(sums.normalized_errors.size() - 1);
-  ++sums.normalized_errors[static_cast<std::size_t>(std::clamp(bins, 0.0, last))];
+  ++sums.normalized_errors[normalized_bin(distance, sigma_voxels, sums.normalized_errors.size())];
 }
 
 std::string row(const std::string& name, const DepthAccuracy& a) {
@@ -128,7 +135,8 @@ DepthAccuracy depth_accuracy(const EstimatedDepth& estimate, std::span<const flo
     } else if (truth[i] > 0 && std::isfinite(truth[i])) {
       ++sums.true_pixels;
       if (!has_depth) continue;
-      const double sigma = estimate.variance.empty() ? 0.0 : std::sqrt(std::max(0.0f, estimate.variance[i]));
+      const double variance = estimate.variance.empty() ? NAN : estimate.variance[i];
+      const double sigma = variance >= 0 ? std::sqrt(variance) : NAN;
       count_found(sums, (static_cast<double>(z) - truth[i]) / options.voxel_size, sigma / options.voxel_size,
                   options.voxel_size);
     }

@@ -43,8 +43,9 @@ struct DepthAccuracy {
   static constexpr double kBiasVoxels = 4;  ///< outliers beyond would drown the bias
   std::int64_t bias_pixels = 0;             ///< found pixels within kBiasVoxels
   double signed_error_voxels = 0;           ///< summed over them
-  std::int64_t calibrated_pixels = 0;       ///< found pixels with a variance > 0
-  /// Counts of |error| / sigma in bins of 1 / kBinsPerSigma; the last bin takes the rest.
+  std::int64_t calibrated_pixels = 0;       ///< found pixels with a variance >= 0
+  /// Counts of |error| / sigma in bins of 1 / kBinsPerSigma; the last bin takes the rest, and errors where
+  /// sigma is 0.
   static constexpr int kBinsPerSigma = 25;  ///< so that 1 and 1.96 are edges
   std::array<std::int64_t, 10 * kBinsPerSigma + 1> normalized_errors{};
 

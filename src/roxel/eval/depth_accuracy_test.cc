@@ -79,6 +79,17 @@ TEST(DepthAccuracy, OverconfidenceShows) {
   EXPECT_NEAR(bold.median_normalized_error(), 2 * 0.674, 0.06);
 }
 
+TEST(DepthAccuracy, NoVarianceIsInfinitelySure) {
+  const std::vector<float> truth(5, 2.0f), depth = {2.1f, 2, 2.1f, 2.1f, 2.1f};
+  const std::vector<float> variance = {0, 0, 0.01f, kNan, -1};
+  const DepthAccuracy found = depth_accuracy({depth, variance, {}}, truth, {});
+  EXPECT_EQ(found.found_pixels, 5);
+  EXPECT_EQ(found.calibrated_pixels, 3);  // what is no variance says nothing
+  EXPECT_EQ(found.normalized_errors.back(), 1);
+  EXPECT_EQ(found.normalized_errors.front(), 1);
+  EXPECT_DOUBLE_EQ(found.share_within_sigma(3), 2 / 3.0);
+}
+
 TEST(DepthAccuracy, ViewsAddUpToOne) {
   const std::vector<float> truth = {1, 2, 0, 4, 5, 0}, depth = {1, 2.7f, 1, 3, 0, 0}, variance(6, 0.25f);
   const auto part = [&](int begin, int count) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "roxel/base/error.h"
@@ -9,10 +10,16 @@
 namespace roxel {
 namespace {
 
-double mean(const std::vector<double>& values) {
-  return values.empty()
-             ? 0.0
-             : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+constexpr double kNothing = std::numeric_limits<double>::infinity();  ///< distance of what is not there
+
+double mean_distance(const std::vector<double>& distances) {
+  return distances.empty() ? kNothing
+                           : std::accumulate(distances.begin(), distances.end(), 0.0) /
+                                 static_cast<double>(distances.size());
+}
+
+double distance_quantile(std::vector<double>& distances, double q) {
+  return distances.empty() ? kNothing : quantile(distances, q);
 }
 
 double share_within(const std::vector<double>& values, double limit) {
@@ -46,11 +53,11 @@ SurfaceAccuracy surface_accuracy(std::vector<double> to_truth, std::vector<doubl
   const double largest = distances.empty() ? 0.0 : *std::max_element(distances.begin(), distances.end());
   for (int step = 0; step <= SurfaceAccuracy::kCurveSteps && largest > 0; ++step)
     accuracy.curve.push_back(shares_within(largest * step / SurfaceAccuracy::kCurveSteps));
-  accuracy.mean_to_truth = mean(to_truth);
-  accuracy.mean_to_estimate = mean(to_estimate);
-  accuracy.median_to_truth = quantile(to_truth, 0.5);
-  accuracy.median_to_estimate = quantile(to_estimate, 0.5);
-  accuracy.accuracy_90 = quantile(to_truth, 0.9);
+  accuracy.mean_to_truth = mean_distance(to_truth);
+  accuracy.mean_to_estimate = mean_distance(to_estimate);
+  accuracy.median_to_truth = distance_quantile(to_truth, 0.5);
+  accuracy.median_to_estimate = distance_quantile(to_estimate, 0.5);
+  accuracy.accuracy_90 = distance_quantile(to_truth, 0.9);
   return accuracy;
 }
 

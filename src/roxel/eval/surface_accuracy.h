@@ -21,8 +21,8 @@ struct DistanceShares {
 struct SurfaceAccuracy {
   std::int64_t estimate_points = 0;
   std::int64_t truth_points = 0;
-  double accuracy_90 = 0;    ///< distance that 90 % of the estimate is within; 0 without an estimate
-  double mean_to_truth = 0;  ///< of the estimate's points
+  double accuracy_90 = 0;    ///< distance that 90 % of the estimate is within; infinity without an estimate
+  double mean_to_truth = 0;  ///< of the estimate's points; infinity without any, as is the median
   double median_to_truth = 0;
   double mean_to_estimate = 0;  ///< of the truth's points; infinity without an estimate
   double median_to_estimate = 0;
@@ -32,7 +32,7 @@ struct SurfaceAccuracy {
 };
 
 /// From distances that are known: of the estimate's points to the truth, and of the truth's to the estimate.
-/// Shares of nothing are 0.
+/// Shares of nothing are 0, its distances infinity: what found nothing is not perfect.
 SurfaceAccuracy surface_accuracy(std::vector<double> to_truth, std::vector<double> to_estimate,
                                  const std::vector<double>& distances);
 

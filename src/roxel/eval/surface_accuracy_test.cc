@@ -62,9 +62,13 @@ TEST(SurfaceAccuracy, ByHand) {
   EXPECT_DOUBLE_EQ(accuracy.mean_to_estimate, 7 / 3.0);
 }
 
-TEST(SurfaceAccuracy, OfNothingIsZero) {
+TEST(SurfaceAccuracy, NothingIsInfinitelyFarAndItsSharesAreZero) {
   const SurfaceAccuracy accuracy = surface_accuracy({}, {1}, {2});
-  EXPECT_EQ(accuracy.accuracy_90, 0);
+  EXPECT_EQ(accuracy.accuracy_90, INFINITY);
+  EXPECT_EQ(accuracy.mean_to_truth, INFINITY);
+  EXPECT_EQ(accuracy.median_to_truth, INFINITY);
+  EXPECT_EQ(accuracy.mean_to_estimate, 1);
+  EXPECT_EQ(surface_accuracy({1}, {}, {2}).mean_to_estimate, INFINITY);
   EXPECT_EQ(accuracy.shares[0].precision, 0);
   EXPECT_EQ(accuracy.shares[0].f_score, 0);
 }

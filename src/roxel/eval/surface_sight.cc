@@ -87,7 +87,8 @@ std::vector<int> count_sightings(const Mesh& surface, std::span<const Eigen::Vec
                       [&](std::int64_t begin, std::int64_t end, int) {
                         for (std::int64_t i = begin; i < end; ++i)
                           for (const PinholeCamera& camera : cameras)
-                            counts[i] += in_image(camera, points[i]) && !occluder.between(camera.pose.centre, points[i]);
+                            counts[i] += in_image(camera, points[i]) &&
+                                         !occluder.between(camera.pose.centre, points[i]);
                       });
   return counts;
 }

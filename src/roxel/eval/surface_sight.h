@@ -9,9 +9,9 @@
 
 namespace roxel {
 
-/// The number of cameras that see each point: it projects into the image, and the straight line to the camera meets no
-/// triangle before the last kSightMargin of its length. Points that lie on the surface see themselves. The same for any
-/// number of threads.
+/// The number of cameras that see each point: it projects into the image, and the straight line to the camera
+/// meets no triangle before the last kSightMargin of its length. Points that lie on the surface see
+/// themselves. The same for any number of threads.
 std::vector<int> count_sightings(const Mesh& surface, std::span<const Eigen::Vector3d> points,
                                  std::span<const PinholeCamera> cameras, int threads);
 inline constexpr double kSightMargin = 1e-4;  ///< floats err by 1e-6 of the extent; a grazing ray needs more

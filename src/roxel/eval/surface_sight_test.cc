@@ -23,20 +23,20 @@ Mesh two_walls() {
 }
 
 TEST(SurfaceSight, OfWhatIsHiddenBehindOrOutside) {
-  const std::vector<Vector3d> points{
-      {1, 0, 5},      // seen
-      {-1, 0, 5},     // hidden by the near wall
-      {-0.4, 0, 2},   // on the near wall
-      {4, 0, 5},      // outside the image
-      {1, 0, -5},     // behind the camera
-      {1, 0, 5.1}};   // behind the far wall
+  const std::vector<Vector3d> points{{1, 0, 5},     // seen
+                                     {-1, 0, 5},    // hidden by the near wall
+                                     {-0.4, 0, 2},  // on the near wall
+                                     {4, 0, 5},     // outside the image
+                                     {1, 0, -5},    // behind the camera
+                                     {1, 0, 5.1}};  // behind the far wall
   const std::vector<PinholeCamera> cameras{camera_at({0, 0, 0})};
   EXPECT_THAT(count_sightings(two_walls(), points, cameras, 1), testing::ElementsAre(1, 0, 1, 0, 0, 0));
 }
 
 TEST(SurfaceSight, CountsCamerasAndNotThreads) {
   const std::vector<Vector3d> points{{1, 0, 5}, {-1, 0, 5}};
-  const std::vector<PinholeCamera> cameras{camera_at({0, 0, 0}), camera_at({0.5, 0, 0}), camera_at({-1, 0, 3})};
+  const std::vector<PinholeCamera> cameras{camera_at({0, 0, 0}), camera_at({0.5, 0, 0}),
+                                           camera_at({-1, 0, 3})};
   for (const int threads : {1, 3})
     EXPECT_THAT(count_sightings(two_walls(), points, cameras, threads), testing::ElementsAre(2, 1));
 }
@@ -45,7 +45,8 @@ TEST(SurfaceSight, NeitherDistanceNorOriginHidesASurfaceFromItself) {
   const Vector3d far(1e5, -2e5, 3e4);
   Mesh mesh = two_walls();
   for (Vector3d& x : mesh.points) x += far;
-  const std::vector<Vector3d> points = sample_surface(mesh, {2000, 1, {far + Vector3d(1, -2, 4.9), far + Vector3d(2, 2, 5.1)}});
+  const std::vector<Vector3d> points =
+      sample_surface(mesh, {2000, 1, {far + Vector3d(1, -2, 4.9), far + Vector3d(2, 2, 5.1)}});
   ASSERT_EQ(points.size(), 2000);
   const std::vector<PinholeCamera> cameras{camera_at(far)};
   EXPECT_THAT(count_sightings(mesh, points, cameras, 1), testing::Each(1));

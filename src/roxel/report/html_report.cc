@@ -107,6 +107,9 @@ double number(const ordered_json& json, const char* key) {
 
 std::string percent(double share, int digits = 1) { return format("%.*f %%", digits, 100 * share); }
 
+/// "-" for the distance of an estimate that has no points.
+std::string distance_text(double distance) { return std::isfinite(distance) ? short_number(distance) : "-"; }
+
 std::string duration(double seconds) {
   if (seconds < 100) return format("%.3g s", seconds);
   const long long whole = std::llround(seconds);
@@ -256,7 +259,7 @@ class Page {
       for (const DistanceShares& s : a.shares) {
         const bool first = &s == &a.shares.front();
         rows.push_back({first ? name : "", first ? grouped(a.estimate_points) : "",
-                        first ? short_number(a.accuracy_90) : "", short_number(s.distance),
+                        first ? distance_text(a.accuracy_90) : "", short_number(s.distance),
                         percent(s.precision), percent(s.recall), format("%.4f", s.f_score)});
       }
     out_ += "<h3>Surfaces</h3>\n" + table(rows);

@@ -81,6 +81,14 @@ TEST(HtmlReport, ShowsMeasures) {
   EXPECT_THAT(page, HasSubstr("no &lt;truth&gt;"));
 }
 
+TEST(HtmlReport, AnEmptyEstimateHasNoAccuracy) {
+  ReportContent content = some_content();
+  RunMeasures measures;
+  measures.surfaces = {{"points", surface_accuracy({}, {1}, {0.5})}};
+  content.measures = &measures;
+  EXPECT_THAT(html_report(content), HasSubstr("<td>points</td><td>0</td><td>-</td><td>0.5</td>"));
+}
+
 TEST(HtmlReport, OfAnEmptySummaryIsStillAPage) {
   const std::string page = html_report({});
   EXPECT_THAT(page, HasSubstr("</html>"));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "roxel/report/markup.h"
+
 namespace roxel {
 namespace {
 
@@ -104,18 +106,26 @@ NamedPlot quality_plot(const std::string& name, const std::string& title,
            {bars}}};
 }
 
+/// The number of that name, or NaN: a gap.
+double number(const ordered_json& pass, const char* key) {
+  const auto found = pass.is_object() ? pass.find(key) : pass.end();
+  return pass.is_object() && found != pass.end() && found->is_number() ? found->get<double>() : NAN;
+}
+
 /// A line over all passes of all levels, counted through.
 NamedPlot pass_plot(const ordered_json& passes, const char* name, const char* title, const char* key,
                     PlotAxis y) {
   std::vector<PlotSeries> levels;
-  int count = 0, level = 0;
+  int count = 0;
+  double level = 0;
   for (const auto& pass : passes) {
-    if (pass.value("level", 0) != level) {
-      level = pass.value("level", 0);
-      levels.push_back({"level " + std::to_string(level), {}, {}});
+    const double of_pass = number(pass, "level");
+    if (levels.empty() || (of_pass != level && !std::isnan(of_pass))) {
+      level = std::isnan(of_pass) ? 0 : of_pass;
+      levels.push_back({"level " + short_number(level), {}, {}});
     }
     levels.back().x.push_back(++count);
-    levels.back().y.push_back(pass.value(key, NAN));
+    levels.back().y.push_back(number(pass, key));
   }
   return {name, {title, {"pass", 0.5, count + 0.5}, std::move(y), std::move(levels)}};
 }
@@ -142,7 +152,7 @@ std::vector<NamedPlot> measure_plots(const RunMeasures& measures) {
 std::vector<NamedPlot> convergence_plots(const ordered_json& summary) {
   if (!summary.is_object()) return {};
   const ordered_json passes = summary.value("passes", ordered_json::array());
-  if (passes.empty()) return {};
+  if (!passes.is_array() || passes.empty()) return {};
   return {
       pass_plot(passes, "opacity_change", "Mean change of opacity", "mean_opacity_change",
                 {"change a pass", {}, {}, true}),

@@ -18,6 +18,11 @@ __attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ..
   return text;
 }
 
+/// "-" for the distances of an estimate that has no points.
+std::string distance_text(double distance, int digits) {
+  return std::isfinite(distance) ? format("%.*g", digits, distance) : "-";
+}
+
 /// The shortest text of a number, as a key.
 std::string key(double value) { return format("%g", value); }
 
@@ -87,7 +92,7 @@ ordered_json surface_json(const NamedSurfaceAccuracy& surface) {
         {{"distance", s.distance}, {"precision", s.precision}, {"recall", s.recall}, {"f_score", s.f_score}});
   return {{"name", surface.name},
           {"points", a.estimate_points},
-          {"accuracy_90", a.accuracy_90},
+          {"accuracy_90", finite(a.accuracy_90)},
           {"mean_to_truth", finite(a.mean_to_truth)},
           {"median_to_truth", finite(a.median_to_truth)},
           {"mean_to_estimate", finite(a.mean_to_estimate)},
@@ -173,9 +178,10 @@ std::string surfaces_csv(const std::vector<NamedSurfaceAccuracy>& surfaces) {
       "estimate,points,accuracy_90,mean_to_truth,mean_to_estimate,distance,precision,recall,f_score\n";
   for (const auto& [name, a] : surfaces)
     for (const DistanceShares& s : a.shares)
-      csv += cell(name) + format(",%lld,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
-                                 static_cast<long long>(a.estimate_points), a.accuracy_90, a.mean_to_truth,
-                                 a.mean_to_estimate, s.distance, s.precision, s.recall, s.f_score);
+      csv += cell(name) + format(",%lld,", static_cast<long long>(a.estimate_points)) +
+             distance_text(a.accuracy_90, 6) + "," + distance_text(a.mean_to_truth, 6) + "," +
+             distance_text(a.mean_to_estimate, 6) +
+             format(",%.6g,%.6g,%.6g,%.6g\n", s.distance, s.precision, s.recall, s.f_score);
   return csv;
 }
 
@@ -246,8 +252,8 @@ std::string surfaces_text(const RunMeasures& measures) {
   for (const auto& [name, a] : measures.surfaces)
     for (std::size_t i = 0; i < a.shares.size(); ++i) {
       const DistanceShares& s = a.shares[i];
-      head += i == 0 ? format("| %s | %lld | %.4g", name.c_str(), static_cast<long long>(a.estimate_points),
-                              a.accuracy_90)
+      head += i == 0 ? format("| %s | %lld | %s", name.c_str(), static_cast<long long>(a.estimate_points),
+                              distance_text(a.accuracy_90, 4).c_str())
                      : std::string("| | | ");
       head += format(" | %.4g | %.2f | %.2f | %.4f |\n", s.distance, 100 * s.precision, 100 * s.recall,
                      s.f_score);

@@ -97,6 +97,38 @@ TEST(RunMeasures, TextIsShortWhereViewsAreMany) {
   EXPECT_THAT(to_text(m), HasSubstr("| points | 2 | 2 | 1 | 50.00 | 50.00 | 0.5000 |"));
 }
 
+TEST(RunMeasures, AnEmptyEstimateHasNoDistances) {
+  RunMeasures m;
+  m.surfaces = {{"points", surface_accuracy({}, {INFINITY}, {0.5})}};
+  const auto json = to_json(m)["surfaces"][0];
+  for (const char* key :
+       {"accuracy_90", "mean_to_truth", "median_to_truth", "mean_to_estimate", "median_to_estimate"})
+    EXPECT_TRUE(json[key].is_null()) << key;
+  EXPECT_THAT(to_text(m), HasSubstr("| points | 0 | - | 0.5 | 0.00 | 0.00 | 0.0000 |"));
+  EXPECT_THAT(csv_tables(m)[0].second, HasSubstr("\npoints,0,-,-,-,0.5,0,0,0\n"));
+}
+
+TEST(ConvergencePlots, WhatIsNoNumberIsAGap) {
+  const nlohmann::ordered_json pass{{"level", 1}, {"mean_log_likelihood", -3.0}, {"active_voxels", 9}};
+  nlohmann::ordered_json broken = pass;
+  broken["mean_log_likelihood"] = nullptr;
+  broken["active_voxels"] = "many";
+  broken["level"] = nullptr;
+  nlohmann::ordered_json summary;
+  summary["passes"] = {broken, pass, broken, 5};
+  const std::vector<NamedPlot> plots = convergence_plots(summary);
+  ASSERT_EQ(plots.size(), 4);
+  std::vector<double> likelihoods;
+  for (const PlotSeries& level : plots[1].plot.series)
+    likelihoods.insert(likelihoods.end(), level.y.begin(), level.y.end());
+  ASSERT_EQ(likelihoods.size(), 4);
+  for (const int gap : {0, 2, 3}) EXPECT_TRUE(std::isnan(likelihoods[gap])) << gap;
+  EXPECT_EQ(likelihoods[1], -3);
+  for (const NamedPlot& plot : plots) EXPECT_THAT(svg_plot(plot.plot), Not(HasSubstr("nan")));
+  summary["passes"] = 5;
+  EXPECT_TRUE(convergence_plots(summary).empty());
+}
+
 TEST(MeasurePlots, OneForEachPart) {
   std::vector<std::string> names;
   for (const NamedPlot& plot : measure_plots(some_measures())) {

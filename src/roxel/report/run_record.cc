@@ -178,6 +178,11 @@ FinishedRun read_run(const fs::path& run) {
   return {run, std::move(summary), read_volume(run / "volume.vdb")};
 }
 
+void throw_damaged_summary(const fs::path& run, const std::string& why) {
+  throw_invalid((run / "summary.json").string(), "a value of the wrong kind (" + why + ")",
+                "what roxel wrote");
+}
+
 void remove_results(const fs::path& run) {
   json summary;
   try {

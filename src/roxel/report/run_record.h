@@ -60,6 +60,19 @@ struct FinishedRun {
 nlohmann::json read_summary(const std::filesystem::path& run);
 FinishedRun read_run(const std::filesystem::path& run);
 
+[[noreturn]] void throw_damaged_summary(const std::filesystem::path& run, const std::string& why);
+
+/// What read() makes of the summary of `run`; throws InvalidInput naming RUN/summary.json where a value is
+/// not of the kind that it should be.
+template <class Read>
+auto read_from_summary(const std::filesystem::path& run, const Read& read) {
+  try {
+    return read();
+  } catch (const nlohmann::json::exception& error) {
+    throw_damaged_summary(run, error.what());
+  }
+}
+
 /// Removes the files of an earlier run that its summary.json lists, summary.json first, so that results of
 /// two runs never mix. Does nothing where there is no summary.
 void remove_results(const std::filesystem::path& run);

@@ -1,5 +1,6 @@
 #include "roxel/synth/illumination_text.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -15,18 +16,20 @@ ordered_json triple(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z()}; }
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-ordered_json light_json(const World& world, const Lights& lights, int index) {
-  const Light& light = lights.all[index];
+/// Where the node of an occasion stands.
+Eigen::Vector3d node_centre(const World& world, int occasion) {
+  const auto shot = std::find_if(world.shots.begin(), world.shots.end(),
+                                 [&](const Shot& s) { return s.occasion == occasion; });
+  return shot == world.shots.end() ? Eigen::Vector3d::Zero() : shot->camera.pose.centre;
+}
+
+/// The light of an occasion.
+ordered_json light_json(const World& world, const Light& light, int occasion) {
   const Sun& sun = light.environment.sun();
   const Eigen::Vector3d d = sun.direction.cast<double>();
   const double azimuth = std::atan2(d.x(), d.y()) * kDegrees;
-  ordered_json json{{"node", index}};
-  if (world.occasions_are_nodes && lights.all.size() == lights.of_occasion.size())
-    for (const Shot& shot : world.shots)
-      if (shot.occasion == index) {
-        json["center"] = triple(shot.camera.pose.centre.cast<float>());
-        break;
-      }
+  ordered_json json{{"node", occasion}};
+  if (world.occasions_are_nodes) json["center"] = triple(node_centre(world, occasion).cast<float>());
   if (light.time_utc_s) {
     json["time_utc"] = utc_text(*light.time_utc_s);
     json["lat"] = kWorldLatitudeDeg;
@@ -61,8 +64,11 @@ std::string illumination_json(const World& world, const Lights& lights) {
        "el = (0.5 - v/H)*180, pixel centres at +0.5"},
       {"radiance_units", "linear Rec.709, one factor for all; photographs are radiance times exposure"}};
   root["nodes"] = ordered_json::array();
-  for (int i = 0; i < static_cast<int>(lights.all.size()); ++i)
-    root["nodes"].push_back(light_json(world, lights, i));
+  // Nodes each have an entry, also where one light is over all; other occasions share it then.
+  const bool shared = lights.all.size() < lights.of_occasion.size() && !world.occasions_are_nodes;
+  const std::size_t count = shared ? lights.all.size() : lights.of_occasion.size();
+  for (std::size_t i = 0; i < count; ++i)
+    root["nodes"].push_back(light_json(world, lights.all[lights.of_occasion[i]], static_cast<int>(i)));
   return root.dump(1) + "\n";
 }
 
