@@ -3,7 +3,7 @@
 ///     agreement_figures FOLDER [SEED]
 ///
 /// Writes figure_4_*.svg and agreement.csv. "sRGB" are values as photographs store them, "RGB" is linear light;
-/// every space has the noise that `roxel reconstruct` grants it, the scale of exponential agreement is its
+/// every space has the noise that `roxel reconstruct` grants it (4 times that in fields of cells), the scale of exponential agreement is its
 /// 2.5 times, linear agreement is that of eq. (4.1) with a threshold. Colours mix as light does, in linear RGB.
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <string>
@@ -29,10 +30,10 @@ namespace {
 using namespace roxel;
 namespace fs = std::filesystem;
 
-constexpr int kSteps = 50, kPairs = 50;
+constexpr int kSteps = 100, kPairs = 50;
 constexpr double kExponentialNoises = 2.5;  // the scale of exponential agreement in `roxel reconstruct`
 constexpr float kLinearThreshold = 0.8f;    // the thesis does not print its own
-constexpr double kCubeNoises = 4;           // figures 4.4 to 4.6: wide enough to be seen in a cube
+constexpr double kWideNoises = 4;           // figures 4.4 to 4.6 and 4.11: wide enough to be seen
 
 /// A patch of a photograph: colours and their shares of its pixels.
 using Patch = std::vector<std::pair<float, LinearRgb>>;
@@ -56,6 +57,14 @@ struct Matcher {
     return sum.color;
   }
   float operator()(const Patch& a, const Patch& b) const { return agree(gaussian(a), gaussian(b)); }
+
+  /// How well the one colour agrees that agrees best: below 1 for mixed patches.
+  float best(const Patch& patch) const {
+    const ColorGaussian mixed = gaussian(patch);
+    ColorGaussian plain = mixed;
+    std::fill(std::begin(plain.cov), std::end(plain.cov), 0.0f);
+    return agree(mixed, plain);
+  }
 };
 
 Matcher gaussian_matcher(const std::string& name, ColorSpace space, double noises = 1) {
@@ -63,15 +72,15 @@ Matcher gaussian_matcher(const std::string& name, ColorSpace space, double noise
   return {name, ColorTransform(space), GaussianAgreement(noise)};
 }
 
-std::vector<Matcher> matchers() {
+std::vector<Matcher> matchers(double noises = 1) {
   const ColorSpace stored = ColorSpace::kSrgb;
-  const float scale = static_cast<float>(kExponentialNoises * default_noise(stored));
+  const float scale = static_cast<float>(kExponentialNoises * noises * default_noise(stored));
   const float d_max = static_cast<float>(gamut_diameter(stored));
   return {{"linear", ColorTransform(stored), LinearAgreement(d_max, kLinearThreshold)},
           {"exponential", ColorTransform(stored), ExponentialAgreement(scale)},
-          gaussian_matcher("sRGB", stored),
-          gaussian_matcher("Luv", ColorSpace::kLuv),
-          gaussian_matcher("RGB", ColorSpace::kRgb)};
+          gaussian_matcher("sRGB", stored, noises),
+          gaussian_matcher("Luv", ColorSpace::kLuv, noises),
+          gaussian_matcher("RGB", ColorSpace::kRgb, noises)};
 }
 
 LinearRgb mix(const LinearRgb& a, const LinearRgb& b, double share) {
@@ -80,26 +89,27 @@ LinearRgb mix(const LinearRgb& a, const LinearRgb& b, double share) {
 
 const LinearRgb kBlack{0, 0, 0};
 
-/// What becomes of a reference patch as x goes from 0 to 1.
+/// What becomes of a reference patch as x goes from 0 to 1, all of it another.
 struct Experiment {
   std::string number, title, x_label;
+  double shown;  // the graphs end at this x
   std::function<Patch(const LinearRgb& reference, const LinearRgb& other, double x)> target;
 };
 
 std::vector<Experiment> experiments() {
-  return {{"4_7", "Change of colour", "share of another colour mixed in",
+  return {{"4_7", "Change of colour", "share of another colour mixed in", 0.5,
            [](const LinearRgb& a, const LinearRgb& b, double x) {
              return Patch{{1.0f, mix(a, b, x)}};
            }},
-          {"4_8", "Across a colour boundary", "share of the patch in another colour",
+          {"4_8", "Across a colour boundary", "share of the patch in another colour", 1,
            [](const LinearRgb& a, const LinearRgb& b, double x) {
              return Patch{{static_cast<float>(1 - x), a}, {static_cast<float>(x), b}};
            }},
-          {"4_9", "Change of light", "light taken away",
+          {"4_9", "Change of light", "light taken away", 0.5,
            [](const LinearRgb& a, const LinearRgb&, double x) {
              return Patch{{1.0f, mix(a, kBlack, x)}};
            }},
-          {"4_10", "Across the boundary of a shadow", "share of the patch at half the light",
+          {"4_10", "Across the boundary of a shadow", "share of the patch at half the light", 1,
            [](const LinearRgb& a, const LinearRgb&, double x) {
              return Patch{{static_cast<float>(1 - x), a}, {static_cast<float>(x), mix(a, kBlack, 0.5)}};
            }}};
@@ -152,11 +162,20 @@ std::vector<double> mean_curve(const Experiment& experiment, const Matcher& matc
   return mean;
 }
 
+/// The part of a curve that a graph shows.
+PlotSeries shown(const Experiment& experiment, PlotSeries series) {
+  const auto count = static_cast<std::size_t>(std::lround(experiment.shown * kSteps)) + 1;
+  series.x.resize(count);
+  series.y.resize(count);
+  return series;
+}
+
 /// Left graph: one pair of colours, all matchers.
 Plot one_pair_plot(const Experiment& experiment) {
-  Plot plot{experiment.title, {experiment.x_label, 0, 1}, {"agreement", 0, 1}, {}};
+  Plot plot{experiment.title, {experiment.x_label, 0, experiment.shown}, {"agreement", 0, 1}, {}};
   for (const Matcher& matcher : matchers())
-    plot.series.push_back({matcher.name, steps(), curve(experiment, matcher, kOnePair)});
+    plot.series.push_back(
+        shown(experiment, {matcher.name, steps(), curve(experiment, matcher, kOnePair)}));
   return plot;
 }
 
@@ -165,14 +184,15 @@ Plot random_pairs_plot(const Experiment& experiment, const std::vector<Pair>& pa
   const Matcher luv = gaussian_matcher("Luv", ColorSpace::kLuv);
   PlotSeries each{"fifty random pairs, Luv", {}, {}, PlotStyle::kThin};
   for (const Pair& pair : pairs) {
-    const std::vector<double> x = steps(), y = curve(experiment, luv, pair);
-    each.x.insert(each.x.end(), x.begin(), x.end());
-    each.y.insert(each.y.end(), y.begin(), y.end());
-    each.x.push_back(1);
+    const PlotSeries one = shown(experiment, {"", steps(), curve(experiment, luv, pair)});
+    each.x.insert(each.x.end(), one.x.begin(), one.x.end());
+    each.y.insert(each.y.end(), one.y.begin(), one.y.end());
+    each.x.push_back(experiment.shown);
     each.y.push_back(std::numeric_limits<double>::quiet_NaN());  // lifts the pen
   }
-  const PlotSeries mean{"their mean", steps(), mean_curve(experiment, luv, pairs), PlotStyle::kDashes};
-  return {experiment.title, {experiment.x_label, 0, 1}, {"agreement", 0, 1}, {each, mean}};
+  const PlotSeries mean = shown(
+      experiment, {"their mean", steps(), mean_curve(experiment, luv, pairs), PlotStyle::kDashes});
+  return {experiment.title, {experiment.x_label, 0, experiment.shown}, {"agreement", 0, 1}, {each, mean}};
 }
 
 /// Figure 4.3, in one dimension: with spread along one axis alone the others' factors are 1.
@@ -212,9 +232,10 @@ CellPanel panel_of(const std::string& title, int columns, int rows, const Slice&
   return panel;
 }
 
+/// Black is the best that any colour agrees.
 CellPanel agreement_panel(const Matcher& matcher, const Patch& reference, const Slice& slice) {
   return panel_of(matcher.name, 60, 45, slice, [&](const LinearRgb& color) {
-    return agreement_fill(matcher(reference, {{1.0f, color}}));
+    return agreement_fill(matcher(reference, {{1.0f, color}}) / matcher.best(reference));
   });
 }
 
@@ -225,10 +246,12 @@ std::string slice_svg(const std::string& title, const Patch& reference, const Sl
   return svg_panels(title, panels, x_label, y_label);
 }
 
+const Patch kBlueAndYellow{{0.5f, {0, 0, 1}}, {0.5f, {1, 1, 0}}};
+
 /// Figures 4.4 to 4.6: a plane of the cube that holds the reference.
 void write_cube_figures(const fs::path& folder) {
-  const std::vector<Matcher> by{gaussian_matcher("sRGB", ColorSpace::kSrgb, kCubeNoises),
-                                gaussian_matcher("Luv", ColorSpace::kLuv, kCubeNoises)};
+  const std::vector<Matcher> by{gaussian_matcher("sRGB", ColorSpace::kSrgb, kWideNoises),
+                                gaussian_matcher("Luv", ColorSpace::kLuv, kWideNoises)};
   const auto write = [&](const char* name, const std::string& svg) {
     write_text_atomically(folder / name, svg);
   };
@@ -242,12 +265,11 @@ void write_cube_figures(const fs::path& folder) {
   const Patch red{{1.0f, {1, 0, 0}}};
   const Slice reds = [](double x, double y) { return EncodedRgb{1, x, y}; };
   write("figure_4_5.svg", slice_svg("Agreement with pure red", red, reds, by, "green", "blue"));
-  const Patch both{{0.5f, {0, 0, 1}}, {0.5f, {1, 1, 0}}};
   const Slice blue_yellow = [](double x, double y) { return EncodedRgb{y, y, x}; };
-  write("figure_4_6a.svg", slice_svg("Agreement with blue and yellow", both, blue_yellow, by, "blue",
+  write("figure_4_6a.svg", slice_svg("Agreement with blue and yellow", kBlueAndYellow, blue_yellow, by, "blue",
                                      "red and green together"));
   const Slice across = [](double x, double y) { return EncodedRgb{y, x, 0.5}; };
-  write("figure_4_6b.svg", slice_svg("The same across, where blue is half", both, across, by, "green", "red"));
+  write("figure_4_6b.svg", slice_svg("The same across, where blue is half", kBlueAndYellow, across, by, "green", "red"));
 }
 
 /// The image of figure 4.11: hue goes to the right, light upwards from a quarter to all; its middle is an orange.
@@ -271,7 +293,7 @@ double half_reach(const Matcher& matcher, bool upwards) {
 
 void write_color_by_light(const fs::path& folder) {
   const Patch middle{{1.0f, decode(color_by_light(0.5, 0.5))}};
-  std::vector<Matcher> by = matchers();
+  std::vector<Matcher> by = matchers(kWideNoises);
   by.pop_back();  // the thesis's four
   write_text_atomically(folder / "figure_4_11.svg",
                         slice_svg("Agreement with the colour in the middle", middle, color_by_light, by,
@@ -303,6 +325,9 @@ std::string key_figures(const std::vector<Pair>& pairs) {
       out += line(experiment.number, matcher.name, "mean of pairs: half at", half_change(mean));
       out += line(experiment.number, matcher.name, "mean of pairs: at 0.5", mean[kSteps / 2]);
     }
+  }
+  for (const Matcher& matcher : matchers(kWideNoises)) {
+    out += line("4_6", matcher.name, "best agreement", matcher.best(kBlueAndYellow));
     out += line("4_11", matcher.name, "reach in hue", half_reach(matcher, false));
     out += line("4_11", matcher.name, "reach in light", half_reach(matcher, true));
   }
