@@ -2,9 +2,10 @@
 ///
 ///     agreement_figures FOLDER [SEED]
 ///
-/// Writes figure_4_*.svg and agreement.csv. "sRGB" are values as photographs store them, "RGB" is linear light;
-/// every space has the noise that `roxel reconstruct` grants it (4 times that in fields of cells), the scale of exponential agreement is its
-/// 2.5 times, linear agreement is that of eq. (4.1) with a threshold. Colours mix as light does, in linear RGB.
+/// Writes figure_4_*.svg and agreement.csv. "sRGB" are values as photographs store them, "RGB" is linear
+/// light; every space has the noise that `roxel reconstruct` grants it (4 times that in fields of cells), the
+/// scale of exponential agreement is its 2.5 times, linear agreement is that of eq. (4.1) with a threshold.
+/// Colours mix as light does, in linear RGB.
 
 #include <algorithm>
 #include <cmath>
@@ -174,8 +175,7 @@ PlotSeries shown(const Experiment& experiment, PlotSeries series) {
 Plot one_pair_plot(const Experiment& experiment) {
   Plot plot{experiment.title, {experiment.x_label, 0, experiment.shown}, {"agreement", 0, 1}, {}};
   for (const Matcher& matcher : matchers())
-    plot.series.push_back(
-        shown(experiment, {matcher.name, steps(), curve(experiment, matcher, kOnePair)}));
+    plot.series.push_back(shown(experiment, {matcher.name, steps(), curve(experiment, matcher, kOnePair)}));
   return plot;
 }
 
@@ -190,18 +190,21 @@ Plot random_pairs_plot(const Experiment& experiment, const std::vector<Pair>& pa
     each.x.push_back(experiment.shown);
     each.y.push_back(std::numeric_limits<double>::quiet_NaN());  // lifts the pen
   }
-  const PlotSeries mean = shown(
-      experiment, {"their mean", steps(), mean_curve(experiment, luv, pairs), PlotStyle::kDashes});
+  const PlotSeries mean =
+      shown(experiment, {"their mean", steps(), mean_curve(experiment, luv, pairs), PlotStyle::kDashes});
   return {experiment.title, {experiment.x_label, 0, experiment.shown}, {"agreement", 0, 1}, {each, mean}};
 }
 
 /// Figure 4.3, in one dimension: with spread along one axis alone the others' factors are 1.
 Plot spread_plot() {
   const GaussianAgreement agree(1);
-  Plot plot{"Agreement by difference and spread", {"difference of the means [noise]", 0, 10},
-            {"agreement", 0, 1}, {}};
+  Plot plot{"Agreement by difference and spread",
+            {"difference of the means [noise]", 0, 10},
+            {"agreement", 0, 1},
+            {}};
   for (const float spread : {0.0f, 1.0f, 2.0f, 4.0f, 8.0f}) {
-    PlotSeries series{(plot.series.empty() ? "spread " : "") + std::to_string(static_cast<int>(spread)), {}, {}};
+    PlotSeries series{
+        (plot.series.empty() ? "spread " : "") + std::to_string(static_cast<int>(spread)), {}, {}};
     for (int i = 0; i <= 100; ++i) {
       ColorGaussian a, b;
       a.mean[0] = 0.1f * static_cast<float>(i);
@@ -217,9 +220,7 @@ Plot spread_plot() {
 /// A plane through the cube of stored colours: colour at (x, y) in [0, 1]^2, y upwards.
 using Slice = std::function<EncodedRgb(double x, double y)>;
 
-bool in_cube(const EncodedRgb& c) {
-  return std::min({c.r, c.g, c.b}) >= 0 && std::max({c.r, c.g, c.b}) <= 1;
-}
+bool in_cube(const EncodedRgb& c) { return std::min({c.r, c.g, c.b}) >= 0 && std::max({c.r, c.g, c.b}) <= 1; }
 
 CellPanel panel_of(const std::string& title, int columns, int rows, const Slice& slice,
                    const std::function<std::string(const LinearRgb&)>& fill) {
@@ -240,7 +241,8 @@ CellPanel agreement_panel(const Matcher& matcher, const Patch& reference, const 
 }
 
 std::string slice_svg(const std::string& title, const Patch& reference, const Slice& slice,
-                      const std::vector<Matcher>& by, const std::string& x_label, const std::string& y_label) {
+                      const std::vector<Matcher>& by, const std::string& x_label,
+                      const std::string& y_label) {
   std::vector<CellPanel> panels{panel_of("colours", 24, 18, slice, color_fill)};
   for (const Matcher& matcher : by) panels.push_back(agreement_panel(matcher, reference, slice));
   return svg_panels(title, panels, x_label, y_label);
@@ -260,19 +262,21 @@ void write_cube_figures(const fs::path& folder) {
     const double s = 1.5 * (x - 0.5);
     return EncodedRgb{y + s, y - s / 2, y - s / 2};
   };
-  write("figure_4_4.svg", slice_svg("Agreement with the middle grey", grey, greys, by, "cyan to red",
-                                    "black to white"));
+  write("figure_4_4.svg",
+        slice_svg("Agreement with the middle grey", grey, greys, by, "cyan to red", "black to white"));
   const Patch red{{1.0f, {1, 0, 0}}};
   const Slice reds = [](double x, double y) { return EncodedRgb{1, x, y}; };
   write("figure_4_5.svg", slice_svg("Agreement with pure red", red, reds, by, "green", "blue"));
   const Slice blue_yellow = [](double x, double y) { return EncodedRgb{y, y, x}; };
-  write("figure_4_6a.svg", slice_svg("Agreement with blue and yellow", kBlueAndYellow, blue_yellow, by, "blue",
-                                     "red and green together"));
+  write("figure_4_6a.svg", slice_svg("Agreement with blue and yellow", kBlueAndYellow, blue_yellow, by,
+                                     "blue", "red and green together"));
   const Slice across = [](double x, double y) { return EncodedRgb{y, x, 0.5}; };
-  write("figure_4_6b.svg", slice_svg("The same across, where blue is half", kBlueAndYellow, across, by, "green", "red"));
+  write("figure_4_6b.svg",
+        slice_svg("The same across, where blue is half", kBlueAndYellow, across, by, "green", "red"));
 }
 
-/// The image of figure 4.11: hue goes to the right, light upwards from a quarter to all; its middle is an orange.
+/// The image of figure 4.11: hue goes to the right, light upwards from a quarter to all; its middle is an
+/// orange.
 EncodedRgb color_by_light(double x, double y) {
   const EncodedRgb full = encoded_from_hsv({std::fmod(1 + 1 / 12.0 + 0.5 * (x - 0.5), 1.0), 0.6, 1});
   return encode(mix(kBlack, decode(full), 0.25 + 0.75 * y));
@@ -295,9 +299,8 @@ void write_color_by_light(const fs::path& folder) {
   const Patch middle{{1.0f, decode(color_by_light(0.5, 0.5))}};
   std::vector<Matcher> by = matchers(kWideNoises);
   by.pop_back();  // the thesis's four
-  write_text_atomically(folder / "figure_4_11.svg",
-                        slice_svg("Agreement with the colour in the middle", middle, color_by_light, by,
-                                  "hue", "light"));
+  write_text_atomically(folder / "figure_4_11.svg", slice_svg("Agreement with the colour in the middle",
+                                                              middle, color_by_light, by, "hue", "light"));
 }
 
 /// Where a falling curve crosses one half; 1 where it never does.
@@ -307,7 +310,8 @@ double half_change(const std::vector<double>& y) {
   return 1;
 }
 
-std::string line(const std::string& figure, const std::string& matcher, const std::string& what, double value) {
+std::string line(const std::string& figure, const std::string& matcher, const std::string& what,
+                 double value) {
   char text[200];
   std::snprintf(text, sizeof text, "%s,%s,%s,%.4f\n", figure.c_str(), matcher.c_str(), what.c_str(), value);
   return text;

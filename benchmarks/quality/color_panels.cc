@@ -32,7 +32,8 @@ std::string cell_paths(const CellPanel& panel) {
       const std::string& fill = panel.fills[row * panel.columns + column];
       const int begin = column;
       while (column < panel.columns && panel.fills[row * panel.columns + column] == fill) ++column;
-      if (!fill.empty()) paths[fill] += format("M%d %dh%dv1h-%dz", begin, row, column - begin, column - begin);
+      if (!fill.empty())
+        paths[fill] += format("M%d %dh%dv1h-%dz", begin, row, column - begin, column - begin);
     }
   std::string out;
   for (const auto& [fill, path] : paths) out += "<path fill=\"" + fill + "\" d=\"" + path + "\"/>\n";
@@ -71,13 +72,14 @@ std::string svg_panels(const std::string& title, const std::vector<CellPanel>& p
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" role=\"img\" "
       "font-family=\"sans-serif\" font-size=\"13\"><rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
       width, height);
-  out += "<text x=\"12\" y=\"20\" font-size=\"15\" font-weight=\"bold\">" + escape_markup(title) + "</text>\n";
+  out +=
+      "<text x=\"12\" y=\"20\" font-size=\"15\" font-weight=\"bold\">" + escape_markup(title) + "</text>\n";
   for (int i = 0; i < count; ++i) out += draw_panel(panels[i], kLeft + i * (kWidth + kGap));
   out += format("<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">", width / 2, height - 9) +
          escape_markup(x_label) + "</text>\n";
-  out += format("<text transform=\"translate(15 %d) rotate(-90)\" text-anchor=\"middle\">",
-                kTop + kHeight / 2) +
-         escape_markup(y_label) + "</text>\n";
+  out +=
+      format("<text transform=\"translate(15 %d) rotate(-90)\" text-anchor=\"middle\">", kTop + kHeight / 2) +
+      escape_markup(y_label) + "</text>\n";
   return out + "</svg>\n";
 }
 
