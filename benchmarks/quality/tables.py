@@ -40,6 +40,10 @@ COLUMNS = [("voxels", "voxels"), ("close", "within 4 voxels %"), ("opacity", "we
            ("depth_4", "depth within 4 voxels %"), ("f_score", "F at 1 % of the diagonal")]
 # The order that the thesis finds, best first.
 THESIS_ORDER = [("gaussian", "luv"), ("gaussian", "rgb"), ("exponential", "rgb")]
+# What the page shows of each run: a cross-section that eval draws, and its histogram of distances.
+PICTURES = {"plane": "section_x", "head": "section_x", "mug": "section_z"}
+HISTOGRAM = "voxel_distances"
+THESIS_PICTURES = {"plane": "8.5, 8.6", "head": "8.11, 8.12"}
 
 
 def all_runs():
@@ -153,6 +157,31 @@ def world_table(world, results):
     return lines
 
 
+def pictures_of(run):
+    """Pairs of a picture's file beside a run's metrics and its file beside the page."""
+    return [(f"{stem}.svg", f"{run_name(run)}-{stem}.svg") for stem in (PICTURES[run[0]], HISTOGRAM)]
+
+
+def copy_pictures(results, folders, docs):
+    for run in results:
+        if run[2:] in THESIS_ORDER:
+            for source, target in pictures_of(run):
+                shutil.copyfile(folders[run] / source, docs / target)
+
+
+def picture_table(world, results):
+    """Sections and histograms, a column for each of the thesis's choices, worst first as there."""
+    choices = THESIS_ORDER[::-1]
+    lines = [row(["rule"] + [choice_name(choice) for choice in choices]), row(["---"] * (1 + len(choices)))]
+    for update in UPDATES:
+        for i in range(2):
+            runs = [(world, update, *choice) for choice in choices]
+            shown = [f"![{run_name(run)}]({pictures_of(run)[i][1]})" if run in results else "-" for run in runs]
+            if any(run in results for run in runs):
+                lines.append(row([f"`{update}`", *shown]))
+    return lines
+
+
 def ordering(world, update, key, results, less_is_better=False):
     """What a column says of the thesis's order Luv > RGB > exponential; None without all three runs."""
     values = [(results.get((world, update, *choice)) or {}).get(key) for choice in THESIS_ORDER]
@@ -196,7 +225,10 @@ def document(results, resolution, remarks=""):
              "size of voxels, so the numbers of voxels do not compare and the rest does so roughly. The thesis measures from the "
              "nearest voxel of the true surface, `roxel eval` from the surface.", ""]
     for world, what in WORLDS.items():
-        lines += [f"## {world}: {what}", "", *world_table(world, results), ""]
+        thesis = f", as figures {THESIS_PICTURES[world]} of the thesis" if world in THESIS_PICTURES else ""
+        lines += [f"## {world}: {what}", "", *world_table(world, results), "",
+                  f"Cross-sections (opacity in grey, the true outline in red) and voxels by distance{thesis}:", "",
+                  *picture_table(world, results), ""]
     lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results), ""]
     return "\n".join(lines) + (f"\n{remarks.strip()}\n" if remarks.strip() else "")
 
@@ -239,8 +271,9 @@ def main(arguments):
         measure(run, options)
     folders = {run: options.work / str(options.resolution) / (run_name(run) + "-metrics") for run in all_runs()}
     results = {run: read_figures(folder) for run, folder in folders.items() if (folder / "metrics.json").exists()}
-    remarks = pathlib.Path(__file__).with_name("tables_remarks.md")
     options.docs.mkdir(parents=True, exist_ok=True)
+    copy_pictures(results, folders, options.docs)
+    remarks = pathlib.Path(__file__).with_name("tables_remarks.md")
     (options.docs / "tables.md").write_text(
         document(results, options.resolution, remarks.read_text() if remarks.exists() else ""))
     write_csv(options.docs / "tables.csv", results)

@@ -3,6 +3,7 @@
 
 import json
 import pathlib
+import re
 import sys
 import tempfile
 import unittest
@@ -69,6 +70,8 @@ class Tables(unittest.TestCase):
         page = tables.document(results, 77, "## By hand\n\nWhy.")
         self.assertIn("tables.py --resolution 77", page)
         self.assertIn("| plane | `posterior` | holds |", page)
+        self.assertIn("(plane-posterior-gaussian-luv-section_x.svg)", page)
+        self.assertNotIn("(plane-roxels", page)
         self.assertTrue(page.endswith("## By hand\n\nWhy.\n"))
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "tables.csv"
@@ -77,6 +80,23 @@ class Tables(unittest.TestCase):
         self.assertEqual(len(lines), 1 + 6 + 3)
         self.assertIn("thesis,head,,gaussian,luv,62996,64.2,59.9,,,,,", lines)
         self.assertIn("roxel,plane,posterior,gaussian,luv,1000,90,80,95.5,5,61,84,0.9876", lines)
+
+
+    def test_every_picture_of_the_page_is_copied(self):
+        results = results_of("posterior", 0.9, 0.8, 0.7)
+        with tempfile.TemporaryDirectory() as name:
+            docs = pathlib.Path(name)
+            folders = {run: docs / tables.run_name(run) for run in results}
+            for folder in folders.values():
+                folder.mkdir()
+                (folder / "section_x.svg").write_text(folder.name)
+                (folder / "voxel_distances.svg").write_text("bars")
+            tables.copy_pictures(results, folders, docs)
+            linked = re.findall(r"\]\(([^)]*\.svg)\)", tables.document(results, 77))
+            self.assertEqual(len(linked), 6)
+            for target in linked:
+                self.assertTrue((docs / target).is_file(), target)
+            self.assertEqual((docs / "plane-posterior-gaussian-rgb-section_x.svg").read_text(), "plane-posterior-gaussian-rgb")
 
 
 class Runs(unittest.TestCase):
