@@ -41,7 +41,7 @@ COLUMNS = [("voxels", "voxels"), ("close", "within 4 voxels %"), ("opacity", "we
 # The order that the thesis finds, best first.
 THESIS_ORDER = [("gaussian", "luv"), ("gaussian", "rgb"), ("exponential", "rgb")]
 # What the page shows of each run: a cross-section that eval draws, and its histogram of distances.
-PICTURES = {"plane": "section_x", "head": "section_x", "mug": "section_z"}
+PICTURES = {"plane": "section_x", "head": "section_x", "mug": "section_x"}
 HISTOGRAM = "voxel_distances"
 THESIS_PICTURES = {"plane": "8.5, 8.6", "head": "8.11, 8.12"}
 
