@@ -4,6 +4,7 @@
 #   make demo     build, reconstruct a small synthetic world, say where the pictures are
 #   make build    build everything
 #   make bench    build and run the benchmarks
+#   make results  make the thesis's tables and figures anew in docs/results; some ten minutes
 #   make format   format the sources
 #   make docs     write docs/options.md anew from the options table
 #
@@ -13,7 +14,7 @@ JOBS ?= $(shell nproc)
 export ROXEL_COMPILER_LAUNCHER ?= $(shell command -v ccache)
 export CCACHE_SLOPPINESS ?= pch_defines,time_macros
 
-.PHONY: all setup configure build test demo bench format docs clean
+.PHONY: all setup configure build test demo bench results format docs clean
 all: build
 
 setup:
@@ -37,6 +38,12 @@ bench:
 	cmake --preset $(PRESET) -DROXEL_BUILD_BENCHMARKS=ON
 	cmake --build --preset $(PRESET) -j $(JOBS)
 	tools/bench.sh build/$(PRESET)
+
+results: setup
+	cmake --preset $(PRESET) -DROXEL_BUILD_BENCHMARKS=ON
+	cmake --build --preset $(PRESET) -j $(JOBS) --target roxel agreement_figures
+	build/$(PRESET)/benchmarks/quality/agreement_figures docs/results
+	benchmarks/quality/tables.py --roxel build/$(PRESET)/apps/roxel/roxel
 
 format:
 	tools/setup.sh dev

@@ -171,7 +171,11 @@ class Drawing {
 
   static const char* color(std::size_t idx) { return kColors[idx % kColors.size()]; }
   static const char* dashes(const PlotSeries& series, std::size_t idx) {
+    if (series.style == PlotStyle::kThin) return "";
     return series.style == PlotStyle::kDashes ? "5 4" : kDashes[idx % kDashes.size()];
+  }
+  static const char* width(const PlotSeries& series) {
+    return series.style == PlotStyle::kThin ? "0.7\" stroke-opacity=\"0.5" : "2";
   }
 
   bool shows(const PlotSeries& series, std::size_t i) const {
@@ -215,8 +219,8 @@ class Drawing {
     }
     if (path.empty()) return;
     out_ += "<path d=\"" + path +
-            format("\" fill=\"none\" stroke=\"%s\" stroke-width=\"2\" stroke-dasharray=\"%s\"/>\n",
-                   color(idx), dashes(series, idx));
+            format("\" fill=\"none\" stroke=\"%s\" stroke-width=\"%s\" stroke-dasharray=\"%s\"/>\n",
+                   color(idx), width(series), dashes(series, idx));
   }
 
   void draw_texts() {
@@ -237,8 +241,8 @@ class Drawing {
       else if (series.style == PlotStyle::kBars)
         out_ += format("<rect x=\"%.1f\" y=\"36\" width=\"16\" height=\"8\" fill=\"%s\"/>", left, color(i));
       else
-        out_ += format("<path d=\"M%.1f 40h24\" stroke=\"%s\" stroke-width=\"2\" stroke-dasharray=\"%s\"/>",
-                       left, color(i), dashes(series, i));
+        out_ += format("<path d=\"M%.1f 40h24\" stroke=\"%s\" stroke-width=\"%s\" stroke-dasharray=\"%s\"/>",
+                       left, color(i), width(series), dashes(series, i));
       out_ += format("<text x=\"%.1f\" y=\"44\">", left + 28) + escape_markup(series.name) + "</text>\n";
       left += 42 + 7.0 * static_cast<double>(series.name.size());
     }

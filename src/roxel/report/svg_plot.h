@@ -14,7 +14,13 @@ struct PlotAxis {
   bool logarithmic = false;  ///< values that are not above 0 are left out
 };
 
-enum class PlotStyle { kLine, kDashes, kPoints, kBars };
+enum class PlotStyle {
+  kLine,
+  kDashes,
+  kThin,  ///< pale lines, of which many lie over each other
+  kPoints,
+  kBars,
+};
 
 /// One set of values. Bars stand on the lower end of the y axis, from x to x + bar_width.
 struct PlotSeries {

@@ -56,6 +56,13 @@ TEST(SvgPlot, DrawsALineWhereItsPointsAre) {
   EXPECT_THAT(svg, HasSubstr(">one<"));
 }
 
+TEST(SvgPlot, ThinLinesArePaleAndNeverDashed) {
+  // The second of two: a line of its own would be dashed.
+  const PlotSeries thin{"many", {0, 1}, {0, 1}, PlotStyle::kThin};
+  const std::string svg = svg_plot({"Thin", {"x"}, {"y"}, {{"", {}, {}}, thin}});
+  EXPECT_THAT(svg, HasSubstr("stroke-width=\"0.7\" stroke-opacity=\"0.5\" stroke-dasharray=\"\""));
+}
+
 TEST(SvgPlot, BarsStandOnZero) {
   Plot plot{"Bars", {"x", 0, 2}, {"y", 0, 2}, {{"", {0, 1}, {1, 2}, PlotStyle::kBars, 1}}};
   const std::string svg = svg_plot(plot);

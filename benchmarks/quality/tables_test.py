@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+"""Tests of tables.py on metrics made by hand: what is read, how tables say it, which runs are made again."""
+
+import json
+import pathlib
+import re
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import tables  # noqa: E402
+
+
+def metrics(voxels=1000, close=0.9, opacity=0.8, rms=0.05):
+    return {
+        "depth": {"share_within_voxels": {"0.5": 0.3, "1": 0.61, "2": 0.7, "4": 0.84, "8": 0.9}},
+        "surfaces": [{"name": "voxels", "within": [{"distance": 0.02, "f_score": 0.1}]},
+                     {"name": "depth points", "within": [{"distance": 0.02, "f_score": 0.9876}]}],
+        "volume": {"voxels": voxels, "share_within_4_voxels": close, "weighted_mean_opacity": opacity,
+                   "share_of_surface_covered": 0.955},
+        "images": {"object": {"rms": rms}, "all": {"rms": 0.5}},
+    }
+
+
+def results_of(update, luv, rgb, exponential):
+    values = {("gaussian", "luv"): luv, ("gaussian", "rgb"): rgb, ("exponential", "rgb"): exponential}
+    return {("plane", update, *choice): tables.figures(metrics(close=close)) for choice, close in values.items()}
+
+
+class Figures(unittest.TestCase):
+    def test_each_column_is_its_measure(self):
+        found = tables.figures(metrics())
+        expected = {"voxels": 1000, "close": 90, "opacity": 80, "covered": 95.5, "rms": 5, "depth_1": 61,
+                    "depth_4": 84, "f_score": 0.9876}
+        self.assertEqual(list(found), [key for key, _ in tables.COLUMNS])
+        for key, value in expected.items():
+            self.assertAlmostEqual(found[key], value, msg=key)
+
+    def test_what_was_not_measured_is_a_dash(self):
+        found = tables.figures({"depth": None, "surfaces": [], "volume": None, "images": None})
+        self.assertEqual({tables.cell(key, value) for key, value in found.items()}, {"-"})
+
+
+class Tables(unittest.TestCase):
+    def test_the_thesis_stands_above_ours(self):
+        lines = tables.world_table("plane", results_of("roxels", 0.912, 0.8, 0.7))
+        self.assertIn("| thesis, Table 8.1 | Gaussian Luv | 32223 | 83.3 | 77.0 | - | - | - | - | - |", lines)
+        self.assertEqual(lines[-1], "| ours, `roxels` | Gaussian Luv | 1000 | 91.2 | 80.0 | 95.5 | 5.0 | 61.0 | 84.0 | 0.988 |")
+        self.assertEqual(len({line.count("|") for line in lines}), 1)
+        self.assertLess(max(i for i, line in enumerate(lines) if "thesis" in line),
+                        min(i for i, line in enumerate(lines) if "ours" in line))
+
+    def test_the_order_is_told_from_the_figures(self):
+        said = {(0.9, 0.8, 0.7): "holds", (0.9, 0.9, 0.7): "holds, with a tie",
+                (0.8, 0.9, 0.7): "RGB before Luv, both before exponential",
+                (0.9, 0.7, 0.8): "Luv before RGB, but exponential between",
+                (0.8, 0.7, 0.9): "Luv before RGB, but exponential first",
+                (0.7, 0.9, 0.8): "RGB before Luv, exponential between",
+                (0.7, 0.8, 0.9): "RGB before Luv, exponential first"}
+        for values, words in said.items():
+            results = results_of("posterior", *values)
+            self.assertEqual(tables.ordering("plane", "posterior", "close", results), words, values)
+            back = tables.ordering("plane", "posterior", "close", results, less_is_better=True)
+            self.assertNotEqual(back, words)
+        self.assertIsNone(tables.ordering("plane", "roxels", "close", results))
+
+    def test_page_and_csv_hold_what_there_is(self):
+        results = results_of("posterior", 0.9, 0.8, 0.7)
+        page = tables.document(results, 77, "## By hand\n\nWhy.")
+        self.assertIn("tables.py --resolution 77", page)
+        self.assertIn("| plane | `posterior` | holds |", page)
+        self.assertIn("(plane-posterior-gaussian-luv-section_x.svg)", page)
+        self.assertNotIn("(plane-roxels", page)
+        self.assertTrue(page.endswith("## By hand\n\nWhy.\n"))
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "tables.csv"
+            tables.write_csv(path, results)
+            lines = path.read_text().splitlines()
+        self.assertEqual(len(lines), 1 + 6 + 3)
+        self.assertIn("thesis,head,,gaussian,luv,62996,64.2,59.9,,,,,", lines)
+        self.assertIn("roxel,plane,posterior,gaussian,luv,1000,90,80,95.5,5,61,84,0.9876", lines)
+
+
+    def test_every_picture_of_the_page_is_copied(self):
+        results = results_of("posterior", 0.9, 0.8, 0.7)
+        with tempfile.TemporaryDirectory() as name:
+            docs = pathlib.Path(name)
+            folders = {run: docs / tables.run_name(run) for run in results}
+            for folder in folders.values():
+                folder.mkdir()
+                (folder / "section_x.svg").write_text(folder.name)
+                (folder / "voxel_distances.svg").write_text("bars")
+            tables.copy_pictures(results, folders, docs)
+            linked = re.findall(r"\]\(([^)]*\.svg)\)", tables.document(results, 77))
+            self.assertEqual(len(linked), 6)
+            for target in linked:
+                self.assertTrue((docs / target).is_file(), target)
+            self.assertEqual((docs / "plane-posterior-gaussian-rgb-section_x.svg").read_text(), "plane-posterior-gaussian-rgb")
+
+
+class Runs(unittest.TestCase):
+    def test_names_select(self):
+        self.assertEqual(len(tables.selected("")), 24)
+        self.assertEqual(len(tables.selected("head-roxels-*")), 4)
+        self.assertEqual(tables.selected("nothing"), [])
+
+    def test_a_run_is_made_once_and_again_when_its_command_changes(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name) / "run"
+            count = pathlib.Path(name) / "count"
+            script = f"mkdir {folder}; touch {folder}/done; echo x >> {count}"
+            for command, made in [(script, True), (script, False), (script + " ", True)]:
+                self.assertEqual(tables.make(["sh", "-c", command], folder, "done"), made)
+            self.assertEqual(count.read_text(), "x\nx\n")
+
+    def test_one_percent_is_of_the_data_sets_box(self):
+        with tempfile.TemporaryDirectory() as name:
+            (pathlib.Path(name) / "transforms.json").write_text(json.dumps({"scene_bounds": [[0, 0, 0], [2, 3, 6]]}))
+            self.assertAlmostEqual(tables.one_percent_of_diagonal(pathlib.Path(name)), 0.07)
+
+
+if __name__ == "__main__":
+    unittest.main()
