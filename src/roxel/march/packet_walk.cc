@@ -99,11 +99,11 @@ ROXEL_KERNEL void walk_bricks(BrickCrossings& c) {
     in = out;
 #pragma GCC unroll 3
     for (int a = 0; a < 3; ++a) {
-      const Ints passed = next[a] == plane;
+      const Ints passed = running & (next[a] == plane);
       next[a] += passed & delta[a];
       cell += passed & step[a];
     }
-    cell &= kBrickVoxels - 1;  // lanes that have ended go astray
+    cell &= kBrickVoxels - 1;  // a plane that rounding puts before the end must not lead out of the brick
   }
   store(count, c.count);
   float* const weights = flat(c.weight);
