@@ -1,10 +1,9 @@
 #include "describe.h"
 
-#include <cstdarg>
-#include <cstdio>
 #include <map>
 
 #include "progress_display.h"
+#include "roxel/base/formatted.h"
 #include "roxel/dataset/box_visibility.h"
 #include "roxel/solve/estimate.h"
 
@@ -15,15 +14,6 @@ using nlohmann::ordered_json;
 
 constexpr int kSurveyedViews = 16;
 constexpr double kGibibyte = 1024.0 * 1024.0 * 1024.0;
-
-__attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ...) {
-  char text[512];
-  va_list values;
-  va_start(values, pattern);
-  std::vsnprintf(text, sizeof text, pattern, values);
-  va_end(values);
-  return text;
-}
 
 /// The scene as the reconstruction will see it; background, exposure and surround from a few images only, so
 /// that large data sets are described quickly.
@@ -56,8 +46,8 @@ std::string image_sizes(const Dataset& dataset) {
   std::string text;
   for (const auto& [size, count] : sizes) {
     if (text.size() > 200) return text + ", ...";
-    text += (text.empty() ? "" : ", ") + format("%d x %d", size.first, size.second);
-    if (sizes.size() > 1) text += format(" (%d)", count);
+    text += (text.empty() ? "" : ", ") + formatted("%d x %d", size.first, size.second);
+    if (sizes.size() > 1) text += formatted(" (%d)", count);
   }
   return text;
 }
@@ -77,12 +67,12 @@ int count_lenses(const Dataset& dataset) {
 
 std::string box_text(const Eigen::AlignedBox3d& box) {
   const Eigen::Vector3d a = box.min(), b = box.max();
-  return format("%.6g,%.6g,%.6g,%.6g,%.6g,%.6g", a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
+  return formatted("%.6g,%.6g,%.6g,%.6g,%.6g,%.6g", a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
 }
 
 std::string memory_text(double bytes) {
-  return bytes < 0.1 * kGibibyte ? format("%.0f MiB", bytes / 1024 / 1024)
-                                 : format("%.1f GiB", bytes / kGibibyte);
+  return bytes < 0.1 * kGibibyte ? formatted("%.0f MiB", bytes / 1024 / 1024)
+                                 : formatted("%.1f GiB", bytes / kGibibyte);
 }
 
 /// "  label      value" with the values in one column.
@@ -109,25 +99,25 @@ Description describe(const Input& input, const ReconstructOptions& options, RunC
   Description out;
   out.text = dataset.path + "\n";
   out.text += row("format", dataset.format);
-  out.text += row("images", format("%zu, %s pixels", dataset.views.size(), image_sizes(dataset).c_str()));
-  out.text += row("masks", masks == 0 ? "none" : format("%d", masks));
-  out.text += row("cameras", format("%d", lenses));
-  out.text += row("nodes", format("%zu", dataset.nodes.size()));
-  if (!dataset.points.empty()) out.text += row("points", format("%zu", dataset.points.size()));
+  out.text += row("images", formatted("%zu, %s pixels", dataset.views.size(), image_sizes(dataset).c_str()));
+  out.text += row("masks", masks == 0 ? "none" : formatted("%d", masks));
+  out.text += row("cameras", formatted("%d", lenses));
+  out.text += row("nodes", formatted("%zu", dataset.nodes.size()));
+  if (!dataset.points.empty()) out.text += row("points", formatted("%zu", dataset.points.size()));
   out.text += row("bounds", box_text(scene.bounds.box));
   out.text += row("", scene.bounds.how);
-  out.text += row("far", format("%.6g", scene.bounds.far));
-  out.text += row("voxels", format("%d x %d x %d of %.6g, %d levels", voxels.x(), voxels.y(), voxels.z(),
-                                   scene.voxel_size, options.levels));
+  out.text += row("far", formatted("%.6g", scene.bounds.far));
+  out.text += row("voxels", formatted("%d x %d x %d of %.6g, %d levels", voxels.x(), voxels.y(), voxels.z(),
+                                      scene.voxel_size, options.levels));
   out.text +=
-      row("surround", scene.surround_count > 0 ? format("%d lattices", scene.surround_count) : "none");
-  out.text += row("voxel in px", format("%.2f (median of %d images that see the box; %.2f to %.2f)",
-                                        seen.median_pixels_per_voxel, seen.views, seen.min_pixels_per_voxel,
-                                        seen.max_pixels_per_voxel));
-  out.text += row("seen twice", format("%.0f %% of the box", 100 * seen.share_seen_twice));
+      row("surround", scene.surround_count > 0 ? formatted("%d lattices", scene.surround_count) : "none");
+  out.text += row("voxel in px", formatted("%.2f (median of %d images that see the box; %.2f to %.2f)",
+                                           seen.median_pixels_per_voxel, seen.views,
+                                           seen.min_pixels_per_voxel, seen.max_pixels_per_voxel));
+  out.text += row("seen twice", formatted("%.0f %% of the box", 100 * seen.share_seen_twice));
   out.text += row("memory", "about " + memory_text(cost.memory_bytes));
-  out.text +=
-      row("time", "about " + duration_text(cost.seconds) + format(" on %d threads", context.thread_count()));
+  out.text += row(
+      "time", "about " + duration_text(cost.seconds) + formatted(" on %d threads", context.thread_count()));
   for (const std::string& note : notes)
     if (!note.starts_with("bounds:")) out.text += row("note", note);
   for (const std::string& warning : warnings) out.text += row("WARNING", warning);

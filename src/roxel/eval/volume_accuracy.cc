@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "roxel/base/error.h"
+#include "roxel/volume/saved_voxels.h"
 
 namespace roxel {
 namespace {
@@ -14,19 +15,11 @@ double ratio(double part, double whole) { return whole > 0 ? part / whole : 0.0;
 
 SavedVoxels saved_voxels(const Volume& volume, float opacity_threshold, float confidence_threshold) {
   SavedVoxels saved;
-  if (volume.lattice_count() == 0) return saved;
-  const BrickIndex& index = volume.index(0);
-  for (const Brick& brick : index.bricks())
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (brick.local[v] == kNoVoxel) continue;
-      const std::uint32_t slot = brick.first_slot + brick.local[v];
-      const float alpha = alpha_from_tau(volume.tau[slot]);
-      if (!(alpha >= opacity_threshold && volume.confidence[slot] >= confidence_threshold)) continue;
-      const Eigen::Vector3i in_brick(v % kBrickSide, v / kBrickSide % kBrickSide,
-                                     v / (kBrickSide * kBrickSide));
-      saved.centres.push_back(index.frame().voxel_centre(kBrickSide * brick.coord + in_brick));
-      saved.opacity.push_back(alpha);
-    }
+  for_each_saved_voxel(volume, opacity_threshold, confidence_threshold,
+                       [&](std::uint32_t, const Eigen::Vector3d& centre, float opacity) {
+                         saved.centres.push_back(centre);
+                         saved.opacity.push_back(opacity);
+                       });
   return saved;
 }
 

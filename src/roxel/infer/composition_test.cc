@@ -298,5 +298,22 @@ TEST_F(PacketComposition, LanesStopWhereSingleRaysStop) {
   EXPECT_GT(stopped, 50);
 }
 
+// What is behind an opaque voxel is not looked at again by four children.
+TEST(OpacityMarch, SpentSamplesDoNotDivide) {
+  std::mt19937 random(4);
+  Volume volume = random_volume({1, 1, 1}, 1, 0.01, 0.02, random);
+  const PinholeCamera camera = camera_at({4, 4, -16}, {4, 4, 4}, 8, 24);
+  const SampleView view = view_of(camera, random_image(8, random), plan_of({1, 60}, 1, {20.0}));
+  const auto rays = [&] {
+    const LatticeStack stack(volume);
+    NodeScratch scratch(stack, volume.tau);
+    scratch.compare_with(std::vector<ColorTotals>(volume.slot_count()));
+    return march_opacity(stack, {view}, MarchOptions{}, RunContext(1), scratch).rays;
+  };
+  EXPECT_EQ(rays(), 16 + 64);
+  for (float& tau : volume.tau) tau = 20;
+  EXPECT_EQ(rays(), 16);
+}
+
 }  // namespace
 }  // namespace roxel

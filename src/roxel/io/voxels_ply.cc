@@ -8,6 +8,7 @@
 
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
+#include "roxel/volume/saved_voxels.h"
 
 namespace roxel {
 namespace {
@@ -36,19 +37,10 @@ void append_row(const Eigen::Vector3d& centre, const float color[3], const Color
 std::vector<char> rows_of(const Volume& volume, const ColorTransform& colors, float opacity_threshold,
                           float confidence_threshold) {
   std::vector<char> rows;
-  if (volume.lattice_count() == 0) return rows;
-  const BrickIndex& index = volume.index(0);
-  for (const Brick& brick : index.bricks())
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (brick.local[v] == kNoVoxel) continue;
-      const std::uint32_t slot = brick.first_slot + brick.local[v];
-      const float alpha = alpha_from_tau(volume.tau[slot]);
-      if (!(alpha >= opacity_threshold && volume.confidence[slot] >= confidence_threshold)) continue;
-      const Eigen::Vector3i in_brick(v % kBrickSide, v / kBrickSide % kBrickSide,
-                                     v / (kBrickSide * kBrickSide));
-      append_row(index.frame().voxel_centre(kBrickSide * brick.coord + in_brick),
-                 volume.color_mean[slot].data(), colors, alpha, rows);
-    }
+  for_each_saved_voxel(volume, opacity_threshold, confidence_threshold,
+                       [&](std::uint32_t slot, const Eigen::Vector3d& centre, float opacity) {
+                         append_row(centre, volume.color_mean[slot].data(), colors, opacity, rows);
+                       });
   return rows;
 }
 

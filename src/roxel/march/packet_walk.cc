@@ -47,7 +47,6 @@ inline __attribute__((always_inline)) void enter_bricks(const BrickCrossings& c,
         (to_exit - __builtin_convertvector(planes, Doubles) * distance) * (1.0 / (1 << kShift));
     store(__builtin_convertvector(plane < far ? plane : far, FourInts), entry.next + half);
     store(planes, entry.planes + half);
-    using FourFloats = float __attribute__((vector_size(16)));
     store(__builtin_convertvector(cells, FourFloats), entry.cells + half);
   }
 }

@@ -12,6 +12,7 @@
 #include <limits>
 #include <utility>
 
+#include "roxel/base/lanes.h"
 #include "roxel/camera/camera.h"
 #include "roxel/volume/volume.h"
 
@@ -259,7 +260,7 @@ struct alignas(64) StepChunk {
   static constexpr int kSize = 64;
   /// Arrays are worked on so many entries at a time: up to the next multiple of this behind the count, slots
   /// are good ones and the rest is rubbish.
-  static constexpr int kLanes = 8;
+  static constexpr int kLanes = roxel::kLanes;
   /// Steps that make a chunk worth handing over at a brick's border: rays then stop soon behind a surface.
   static constexpr int kEnough = 8;
 

@@ -82,6 +82,22 @@ inline ::testing::AssertionResult same_as_twin(const Volume& volume, const Ray& 
   return ::testing::AssertionSuccess();
 }
 
+/// A ray through voxel corners, edges and faces, its direction with zeros and equal components: every tie
+/// that the choice of the next plane can meet. From inside the frame, or from outside on the same line.
+inline Ray ray_with_ties(const LatticeFrame& frame, int steps_back, std::mt19937& random) {
+  std::uniform_int_distribution<int> half_cell(1, 31), component(-2, 2);
+  Ray ray{frame.origin, Eigen::Vector3d::Zero()};
+  while (ray.direction.isZero()) {
+    ray.origin = frame.origin;
+    for (int a = 0; a < 3; ++a) {
+      ray.origin[a] += 0.5 * frame.voxel_size * half_cell(random);
+      ray.direction[a] = component(random);
+    }
+  }
+  ray.origin -= ray.direction * steps_back;
+  return ray;
+}
+
 class RandomRays {
  public:
   explicit RandomRays(const Eigen::AlignedBox3d& box, unsigned seed) : box_(box), random_(seed) {}

@@ -1,9 +1,8 @@
 #include "roxel/report/html_report.h"
 
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
+#include "roxel/base/formatted.h"
 #include "roxel/io/image_bytes.h"
 #include "roxel/report/markup.h"
 #include "roxel/report/measure_plots.h"
@@ -71,15 +70,6 @@ footer { margin-top: 2rem; font-size: .85rem; color: #555; border-top: 1px solid
 }
 )";
 
-__attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ...) {
-  char text[512];
-  va_list values;
-  va_start(values, pattern);
-  std::vsnprintf(text, sizeof text, pattern, values);
-  va_end(values);
-  return text;
-}
-
 /// A value of the summary as text; nothing where it is missing or null.
 std::string text_of(const ordered_json& value) {
   if (value.is_null()) return "";
@@ -105,16 +95,16 @@ double number(const ordered_json& json, const char* key) {
   return value.is_number() ? value.get<double>() : 0.0;
 }
 
-std::string percent(double share, int digits = 1) { return format("%.*f %%", digits, 100 * share); }
+std::string percent(double share, int digits = 1) { return formatted("%.*f %%", digits, 100 * share); }
 
 /// "-" for the distance of an estimate that has no points.
 std::string distance_text(double distance) { return std::isfinite(distance) ? short_number(distance) : "-"; }
 
 std::string duration(double seconds) {
-  if (seconds < 100) return format("%.3g s", seconds);
+  if (seconds < 100) return formatted("%.3g s", seconds);
   const long long whole = std::llround(seconds);
-  if (whole < 3600) return format("%lld min %02lld s", whole / 60, whole % 60);
-  return format("%lld h %02lld min", whole / 3600, whole / 60 % 60);
+  if (whole < 3600) return formatted("%lld min %02lld s", whole / 60, whole % 60);
+  return formatted("%lld h %02lld min", whole / 3600, whole / 60 % 60);
 }
 
 /// Rows of cells; all text is escaped here. The first row is the head.
@@ -187,7 +177,7 @@ class Page {
     if (levels.is_array() && !levels.empty())
       figure(text_of(at(levels.back(), "voxels_in_box")), "voxels in the box");
     const ordered_json& rms = at(summary_, "reprojection_rms_percent");
-    if (rms.is_number()) figure(format("%.2f %%", rms.get<double>()), "reprojection error (RMS)");
+    if (rms.is_number()) figure(formatted("%.2f %%", rms.get<double>()), "reprojection error (RMS)");
     if (at(summary_, "seconds").is_number()) figure(duration(number(summary_, "seconds")), "computing time");
     figure(text_of(at(summary_, "termination")), "ended");
     if (const RunMeasures* m = content_.measures) measured_figures(*m);
@@ -260,7 +250,7 @@ class Page {
         const bool first = &s == &a.shares.front();
         rows.push_back({first ? name : "", first ? grouped(a.estimate_points) : "",
                         first ? distance_text(a.accuracy_90) : "", short_number(s.distance),
-                        percent(s.precision), percent(s.recall), format("%.4f", s.f_score)});
+                        percent(s.precision), percent(s.recall), formatted("%.4f", s.f_score)});
       }
     out_ += "<h3>Surfaces</h3>\n" + table(rows);
     out_ += "<p>Distances in world units; the box's diagonal is " + short_number(m.box_diagonal()) +
@@ -306,7 +296,7 @@ class Page {
         {"all views, over", "RMS", "red", "green", "blue", "PSNR", "SSIM"}};
     for (const auto& [name, q] : {std::pair{"the object", total.object}, {"all pixels", total.all}})
       rows.push_back({name, percent(q.rms(), 2), percent(q.rms(0), 2), percent(q.rms(1), 2),
-                      percent(q.rms(2), 2), format("%.2f dB", q.psnr()), format("%.4f", q.ssim())});
+                      percent(q.rms(2), 2), formatted("%.2f dB", q.psnr()), formatted("%.4f", q.ssim())});
     out_ += std::string("<h3>") + title + "</h3>\n" + table(rows);
   }
 
@@ -314,8 +304,8 @@ class Page {
     if (!m.color) return;
     out_ += "<h3>Colour against albedo</h3>\n" +
             table({{"pixels", "CIEDE2000 mean", "median", "relative error mean", "median"},
-                   {grouped(m.color->pixels), format("%.2f", m.color->mean_delta_e),
-                    format("%.2f", m.color->median_delta_e), percent(m.color->mean_relative),
+                   {grouped(m.color->pixels), formatted("%.2f", m.color->mean_delta_e),
+                    formatted("%.2f", m.color->median_delta_e), percent(m.color->mean_relative),
                     percent(m.color->median_relative)}});
   }
 
@@ -324,7 +314,7 @@ class Page {
     heading("Views");
     const double all = number(at(summary_, "dataset"), "images");
     if (all > static_cast<double>(content_.views.size()))
-      out_ += format("<p>%zu of %.0f views.</p>\n", content_.views.size(), all);
+      out_ += formatted("<p>%zu of %.0f views.</p>\n", content_.views.size(), all);
     out_ +=
         "<p>Depth: near is pale, far is blue. Error: black is none, white a quarter of full scale and more. "
         "Sigma: black is sure, white four voxels and more.";
@@ -378,8 +368,8 @@ class Page {
       row(text_of(at(stage, "name")), number(stage, "seconds"));
     row("all", total);
     out_ += table(rows);
-    out_ += format("<p>%.0f threads; peak memory %.0f MiB.</p>\n", number(summary_, "threads"),
-                   number(summary_, "peak_memory_bytes") / 1024 / 1024);
+    out_ += formatted("<p>%.0f threads; peak memory %.0f MiB.</p>\n", number(summary_, "threads"),
+                      number(summary_, "peak_memory_bytes") / 1024 / 1024);
   }
 
   void settings() {

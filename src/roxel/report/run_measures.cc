@@ -1,30 +1,21 @@
 #include "roxel/report/run_measures.h"
 
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
+
+#include "roxel/base/formatted.h"
 
 namespace roxel {
 namespace {
 
 using nlohmann::ordered_json;
 
-__attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ...) {
-  char text[512];
-  va_list values;
-  va_start(values, pattern);
-  std::vsnprintf(text, sizeof text, pattern, values);
-  va_end(values);
-  return text;
-}
-
 /// "-" for the distances of an estimate that has no points.
 std::string distance_text(double distance, int digits) {
-  return std::isfinite(distance) ? format("%.*g", digits, distance) : "-";
+  return std::isfinite(distance) ? formatted("%.*g", digits, distance) : "-";
 }
 
 /// The shortest text of a number, as a key.
-std::string key(double value) { return format("%g", value); }
+std::string key(double value) { return formatted("%g", value); }
 
 ordered_json finite(double value) {
   return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
@@ -162,11 +153,12 @@ std::string depth_csv(const std::vector<NamedDepthAccuracy>& views) {
   for (const double d : all.distances) csv += ",within_" + key(d) + "_units";
   csv += ",share_of_empty_given_depth,bias_voxels,coverage_68,coverage_95\n";
   const auto row = [&](const std::string& name, const DepthAccuracy& a) {
-    csv += cell(name) + format(",%lld,%.6g", static_cast<long long>(a.true_pixels), a.share_found());
-    for (std::size_t i = 0; i < a.thresholds.size(); ++i) csv += format(",%.6g", a.share_within(i));
-    for (std::size_t i = 0; i < a.distances.size(); ++i) csv += format(",%.6g", a.share_within_distance(i));
-    csv += format(",%.6g,%.6g,%.6g,%.6g\n", a.share_false(), a.bias_voxels(), a.share_within_sigma(1),
-                  a.share_within_sigma(1.96));
+    csv += cell(name) + formatted(",%lld,%.6g", static_cast<long long>(a.true_pixels), a.share_found());
+    for (std::size_t i = 0; i < a.thresholds.size(); ++i) csv += formatted(",%.6g", a.share_within(i));
+    for (std::size_t i = 0; i < a.distances.size(); ++i)
+      csv += formatted(",%.6g", a.share_within_distance(i));
+    csv += formatted(",%.6g,%.6g,%.6g,%.6g\n", a.share_false(), a.bias_voxels(), a.share_within_sigma(1),
+                     a.share_within_sigma(1.96));
   };
   for (const NamedDepthAccuracy& view : views) row(view.name, view.accuracy);
   row("all", all);
@@ -178,10 +170,10 @@ std::string surfaces_csv(const std::vector<NamedSurfaceAccuracy>& surfaces) {
       "estimate,points,accuracy_90,mean_to_truth,mean_to_estimate,distance,precision,recall,f_score\n";
   for (const auto& [name, a] : surfaces)
     for (const DistanceShares& s : a.shares)
-      csv += cell(name) + format(",%lld,", static_cast<long long>(a.estimate_points)) +
+      csv += cell(name) + formatted(",%lld,", static_cast<long long>(a.estimate_points)) +
              distance_text(a.accuracy_90, 6) + "," + distance_text(a.mean_to_truth, 6) + "," +
              distance_text(a.mean_to_estimate, 6) +
-             format(",%.6g,%.6g,%.6g,%.6g\n", s.distance, s.precision, s.recall, s.f_score);
+             formatted(",%.6g,%.6g,%.6g,%.6g\n", s.distance, s.precision, s.recall, s.f_score);
   return csv;
 }
 
@@ -190,8 +182,8 @@ std::string histogram_csv(const DistanceHistogram& histogram) {
   for (int bin = 0; bin <= DistanceHistogram::kBins; ++bin) {
     const double from = bin * DistanceHistogram::kBinVoxels;
     const std::string to = bin < DistanceHistogram::kBins ? key(from + DistanceHistogram::kBinVoxels) : "";
-    csv += format("%g,%s,%lld,%.6g\n", from, to.c_str(), static_cast<long long>(histogram.voxels[bin]),
-                  histogram.mean_opacity(bin));
+    csv += formatted("%g,%s,%lld,%.6g\n", from, to.c_str(), static_cast<long long>(histogram.voxels[bin]),
+                     histogram.mean_opacity(bin));
   }
   return csv;
 }
@@ -199,10 +191,10 @@ std::string histogram_csv(const DistanceHistogram& histogram) {
 std::string quality_csv(const std::vector<NamedImageQuality>& views) {
   std::string csv = "view,over,pixels,rms,psnr_db,ssim,rms_r,rms_g,rms_b,ssim_r,ssim_g,ssim_b\n";
   const auto row = [&](const std::string& name, const char* over, const ImageQuality& q) {
-    csv += cell(name) + format(",%s,%lld,%.6g,%.6g,%.6g", over, static_cast<long long>(q.pixels), q.rms(),
-                               q.psnr(), q.ssim());
-    for (int c = 0; c < 3; ++c) csv += format(",%.6g", q.rms(c));
-    for (int c = 0; c < 3; ++c) csv += format(",%.6g", q.ssim(c));
+    csv += cell(name) + formatted(",%s,%lld,%.6g,%.6g,%.6g", over, static_cast<long long>(q.pixels), q.rms(),
+                                  q.psnr(), q.ssim());
+    for (int c = 0; c < 3; ++c) csv += formatted(",%.6g", q.rms(c));
+    for (int c = 0; c < 3; ++c) csv += formatted(",%.6g", q.ssim(c));
     csv += "\n";
   };
   std::vector<NamedImageQuality> rows = views;
@@ -220,8 +212,8 @@ std::string calibration_csv(const DepthAccuracy& all) {
   for (int bin = 0; bin < bins; ++bin) {
     const double width = 1.0 / DepthAccuracy::kBinsPerSigma;
     const std::string to = bin + 1 < bins ? key((bin + 1) * width) : "";
-    csv +=
-        format("%g,%s,%lld\n", bin * width, to.c_str(), static_cast<long long>(all.normalized_errors[bin]));
+    csv += formatted("%g,%s,%lld\n", bin * width, to.c_str(),
+                     static_cast<long long>(all.normalized_errors[bin]));
   }
   return csv;
 }
@@ -229,8 +221,8 @@ std::string calibration_csv(const DepthAccuracy& all) {
 std::string reliability_csv(const Reliability& curve) {
   std::string csv = "mean_opacity,share_with_surface,pixels\n";
   for (int bin = 0; bin < Reliability::kBins; ++bin)
-    csv += format("%.6g,%.6g,%lld\n", curve.mean_opacity(bin), curve.surface_share(bin),
-                  static_cast<long long>(curve.pixels[bin]));
+    csv += formatted("%.6g,%.6g,%lld\n", curve.mean_opacity(bin), curve.surface_share(bin),
+                     static_cast<long long>(curve.pixels[bin]));
   return csv;
 }
 
@@ -238,9 +230,9 @@ std::string quality_text(const char* title, const std::vector<NamedImageQuality>
   if (views.empty()) return "";
   const NamedImageQuality total = total_quality(views);
   std::string text =
-      format("| %s (%zu) | RMS %% | PSNR dB | SSIM |\n|---|---:|---:|---:|\n", title, views.size());
+      formatted("| %s (%zu) | RMS %% | PSNR dB | SSIM |\n|---|---:|---:|---:|\n", title, views.size());
   for (const auto& [name, q] : {std::pair{"object", total.object}, {"all pixels", total.all}})
-    text += format("| %s | %.2f | %.2f | %.4f |\n", name, 100 * q.rms(), q.psnr(), q.ssim());
+    text += formatted("| %s | %.2f | %.2f | %.4f |\n", name, 100 * q.rms(), q.psnr(), q.ssim());
   return text + "\n";
 }
 
@@ -252,11 +244,11 @@ std::string surfaces_text(const RunMeasures& measures) {
   for (const auto& [name, a] : measures.surfaces)
     for (std::size_t i = 0; i < a.shares.size(); ++i) {
       const DistanceShares& s = a.shares[i];
-      head += i == 0 ? format("| %s | %lld | %s", name.c_str(), static_cast<long long>(a.estimate_points),
-                              distance_text(a.accuracy_90, 4).c_str())
+      head += i == 0 ? formatted("| %s | %lld | %s", name.c_str(), static_cast<long long>(a.estimate_points),
+                                 distance_text(a.accuracy_90, 4).c_str())
                      : std::string("| | | ");
-      head += format(" | %.4g | %.2f | %.2f | %.4f |\n", s.distance, 100 * s.precision, 100 * s.recall,
-                     s.f_score);
+      head += formatted(" | %.4g | %.2f | %.2f | %.4f |\n", s.distance, 100 * s.precision, 100 * s.recall,
+                        s.f_score);
     }
   return head + "\n";
 }
@@ -264,7 +256,7 @@ std::string surfaces_text(const RunMeasures& measures) {
 std::string volume_text(const RunMeasures& measures) {
   if (!measures.volume) return "";
   const VolumeAccuracy& a = *measures.volume;
-  return format(
+  return formatted(
       "| voxels of opacity >= %g | within 4 voxels %% | weighted mean opacity %% | surface covered %% "
       "|\n|---:|---:|---:|---:|\n"
       "| %lld | %.2f | %.2f | %.2f |\n\n",
@@ -275,17 +267,18 @@ std::string volume_text(const RunMeasures& measures) {
 std::string calibration_text(const RunMeasures& measures) {
   if (measures.depth.empty()) return "";
   const DepthAccuracy all = total_depth(measures.depth);
-  std::string text = format("depth within 1 sigma %.1f %% (honest: 68.3), within 1.96 sigma %.1f %% (95.0)\n",
-                            100 * all.share_within_sigma(1), 100 * all.share_within_sigma(1.96));
+  std::string text =
+      formatted("depth within 1 sigma %.1f %% (honest: 68.3), within 1.96 sigma %.1f %% (95.0)\n",
+                100 * all.share_within_sigma(1), 100 * all.share_within_sigma(1.96));
   if (measures.opacity_reliability)
-    text += format("opacity is off by %.3f on average (expected calibration error)\n",
-                   measures.opacity_reliability->expected_calibration_error());
+    text += formatted("opacity is off by %.3f on average (expected calibration error)\n",
+                      measures.opacity_reliability->expected_calibration_error());
   return text;
 }
 
 std::string color_text(const std::optional<ColorAccuracy>& color) {
   if (!color) return "";
-  return format(
+  return formatted(
       "colour against albedo: CIEDE2000 mean %.2f, median %.2f; relative error mean %.1f %%, median %.1f %% "
       "(scale %.4g)\n",
       color->mean_delta_e, color->median_delta_e, 100 * color->mean_relative, 100 * color->median_relative,
@@ -366,7 +359,7 @@ std::string to_text(const RunMeasures& measures, std::size_t most_views) {
           quality_text("held-out images", measures.held_out) + calibration_text(measures) +
           color_text(measures.color);
   if (measures.reprojection_rms_percent)
-    text += format("reprojection error %.2f %% of full scale\n", *measures.reprojection_rms_percent);
+    text += formatted("reprojection error %.2f %% of full scale\n", *measures.reprojection_rms_percent);
   for (const std::string& note : measures.notes) text += "note: " + note + "\n";
   return text;
 }

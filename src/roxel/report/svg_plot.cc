@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 
 #include "roxel/base/error.h"
+#include "roxel/base/formatted.h"
 #include "roxel/report/markup.h"
 
 namespace roxel {
@@ -19,15 +18,6 @@ constexpr int kMostTicks = 6;
 constexpr std::array<const char*, 6> kColors{"#0072b2", "#d55e00", "#009e73",
                                              "#cc79a7", "#56b4e9", "#000000"};
 constexpr std::array<const char*, 6> kDashes{"", "7 4", "2 3", "9 3 2 3", "4 4", "1 4"};
-
-__attribute__((format(printf, 1, 2))) std::string format(const char* pattern, ...) {
-  char text[512];
-  va_list values;
-  va_start(values, pattern);
-  std::vsnprintf(text, sizeof text, pattern, values);
-  va_end(values);
-  return text;
-}
 
 /// An axis with its ends known, and where values lie between them.
 class Scale {
@@ -92,7 +82,7 @@ class Drawing {
         y_(plot.y, ranges_[1].low, ranges_[1].high, kHeight - kBottom, kTop + legend_height()) {}
 
   std::string svg() {
-    out_ = format(
+    out_ = formatted(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %g %g\" role=\"img\" "
         "font-family=\"sans-serif\" "
         "font-size=\"13\"><title>%s</title>\n<rect width=\"100%%\" height=\"100%%\" fill=\"#fff\"/>\n",
@@ -142,20 +132,20 @@ class Drawing {
     const double bottom = kHeight - kBottom, top = kTop + legend_height();
     for (const double tick : x_.ticks()) {
       const double at = x_.at(tick);
-      out_ += format(
+      out_ += formatted(
           "<path d=\"M%.1f %.1fV%.1f\" stroke=\"#ddd\"/><text x=\"%.1f\" y=\"%.1f\" "
           "text-anchor=\"middle\">%s</text>\n",
           at, bottom, top, at, bottom + 17, tick_text(tick).c_str());
     }
     for (const double tick : y_.ticks()) {
       const double at = y_.at(tick);
-      out_ += format(
+      out_ += formatted(
           "<path d=\"M%.1f %.1fH%.1f\" stroke=\"#ddd\"/><text x=\"%.1f\" y=\"%.1f\" "
           "text-anchor=\"end\">%s</text>\n",
           kLeft, at, kWidth - kRight, kLeft - 6, at + 4.5, tick_text(tick).c_str());
     }
-    out_ += format("<path d=\"M%.1f %.1fV%.1fH%.1f\" fill=\"none\" stroke=\"#333\"/>\n", kLeft, top, bottom,
-                   kWidth - kRight);
+    out_ += formatted("<path d=\"M%.1f %.1fV%.1fH%.1f\" fill=\"none\" stroke=\"#333\"/>\n", kLeft, top,
+                      bottom, kWidth - kRight);
   }
 
   void draw(const PlotSeries& series, std::size_t idx) {
@@ -188,7 +178,7 @@ class Drawing {
       if (!shows(series, i)) continue;
       const double left = x_.at(series.x[i]), right = x_.at(series.x[i] + series.bar_width),
                    end = y_.at(series.y[i]);
-      out_ += format(
+      out_ += formatted(
           "<rect x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" fill=\"%s\" stroke=\"#fff\" "
           "stroke-width=\"0.5\"/>",
           left, std::min(end, ground), right - left, std::abs(ground - end), color(idx));
@@ -203,8 +193,8 @@ class Drawing {
   }
 
   void draw_point(const PlotSeries& series, std::size_t i, std::size_t idx) {
-    out_ += format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"/>", x_.at(series.x[i]),
-                   y_.at(series.y[i]), color(idx));
+    out_ += formatted("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" fill=\"%s\"/>", x_.at(series.x[i]),
+                      y_.at(series.y[i]), color(idx));
   }
 
   void draw_line(const PlotSeries& series, std::size_t idx) {
@@ -214,36 +204,38 @@ class Drawing {
       const bool shown = shows(series, i);
       const bool alone = shown && !down && (i + 1 == series.x.size() || !shows(series, i + 1));
       if (alone) draw_point(series, i, idx);
-      if (shown) path += format("%s%.1f %.1f", down ? "L" : "M", x_.at(series.x[i]), y_.at(series.y[i]));
+      if (shown) path += formatted("%s%.1f %.1f", down ? "L" : "M", x_.at(series.x[i]), y_.at(series.y[i]));
       down = shown;
     }
     if (path.empty()) return;
     out_ += "<path d=\"" + path +
-            format("\" fill=\"none\" stroke=\"%s\" stroke-width=\"%s\" stroke-dasharray=\"%s\"/>\n",
-                   color(idx), width(series), dashes(series, idx));
+            formatted("\" fill=\"none\" stroke=\"%s\" stroke-width=\"%s\" stroke-dasharray=\"%s\"/>\n",
+                      color(idx), width(series), dashes(series, idx));
   }
 
   void draw_texts() {
-    out_ += format("<text x=\"%.1f\" y=\"20\" font-size=\"15\" font-weight=\"bold\">", 12.0) +
+    out_ += formatted("<text x=\"%.1f\" y=\"20\" font-size=\"15\" font-weight=\"bold\">", 12.0) +
             escape_markup(plot_.title) + "</text>\n";
-    out_ += format("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">", (kLeft + kWidth - kRight) / 2,
-                   kHeight - 10) +
+    out_ += formatted("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">", (kLeft + kWidth - kRight) / 2,
+                      kHeight - 10) +
             escape_markup(plot_.x.label) + "</text>\n";
-    out_ += format("<text transform=\"translate(14 %.1f) rotate(-90)\" text-anchor=\"middle\">",
-                   (kTop + kHeight - kBottom) / 2) +
+    out_ += formatted("<text transform=\"translate(14 %.1f) rotate(-90)\" text-anchor=\"middle\">",
+                      (kTop + kHeight - kBottom) / 2) +
             escape_markup(plot_.y.label) + "</text>\n";
     double left = kLeft;
     for (std::size_t i = 0; i < plot_.series.size(); ++i) {
       const PlotSeries& series = plot_.series[i];
       if (series.name.empty()) continue;
       if (series.style == PlotStyle::kPoints)
-        out_ += format("<circle cx=\"%.1f\" cy=\"40\" r=\"3\" fill=\"%s\"/>", left + 12, color(i));
+        out_ += formatted("<circle cx=\"%.1f\" cy=\"40\" r=\"3\" fill=\"%s\"/>", left + 12, color(i));
       else if (series.style == PlotStyle::kBars)
-        out_ += format("<rect x=\"%.1f\" y=\"36\" width=\"16\" height=\"8\" fill=\"%s\"/>", left, color(i));
+        out_ +=
+            formatted("<rect x=\"%.1f\" y=\"36\" width=\"16\" height=\"8\" fill=\"%s\"/>", left, color(i));
       else
-        out_ += format("<path d=\"M%.1f 40h24\" stroke=\"%s\" stroke-width=\"%s\" stroke-dasharray=\"%s\"/>",
-                       left, color(i), width(series), dashes(series, i));
-      out_ += format("<text x=\"%.1f\" y=\"44\">", left + 28) + escape_markup(series.name) + "</text>\n";
+        out_ +=
+            formatted("<path d=\"M%.1f 40h24\" stroke=\"%s\" stroke-width=\"%s\" stroke-dasharray=\"%s\"/>",
+                      left, color(i), width(series), dashes(series, i));
+      out_ += formatted("<text x=\"%.1f\" y=\"44\">", left + 28) + escape_markup(series.name) + "</text>\n";
       left += 42 + 7.0 * static_cast<double>(series.name.size());
     }
   }

@@ -8,6 +8,7 @@
 
 #include "roxel/color/color_space.h"
 #include "roxel/synth/noise.h"
+#include "roxel/synth/texture.h"
 
 namespace roxel {
 namespace {
@@ -15,16 +16,6 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr float kPi = std::numbers::pi_v<float>;
-
-/// A paint as a display shows it, 0xRRGGBB, in linear light.
-Vector3f paint(std::uint32_t code) {
-  static const std::array<float, 256> kTable = [] {
-    std::array<float, 256> table;
-    for (int i = 0; i < 256; ++i) table[i] = srgb_decode(static_cast<float>(i) / 255.0f);
-    return table;
-  }();
-  return {kTable[code >> 16 & 255], kTable[code >> 8 & 255], kTable[code & 255]};
-}
 
 float clamp01(float x) { return std::clamp(x, 0.0f, 1.0f); }
 
