@@ -12,20 +12,20 @@ if [ ! -x "$roxel" ]; then
 fi
 
 mkdir -p "$folder"
-echo "== photographs of a synthetic world -> $folder/photographs"
-"$roxel" synth head -o "$folder/photographs"
+echo "== photographs of a synthetic world -> $folder/head"
+"$roxel" synth head -o "$folder/head"
 echo "== reconstruction -> $folder/run"
-"$roxel" reconstruct "$folder/photographs" -o "$folder/run" --resolution 128
+"$roxel" reconstruct "$folder/head" -o "$folder/run" --resolution 128
 
 echo "== measured against the truth -> $folder/metrics"
-"$roxel" eval "$folder/run" --truth "$folder/photographs" -o "$folder/metrics"
+"$roxel" eval "$folder/run" --truth "$folder/head" -o "$folder/metrics"
 
 first() { find "$1" -name "*.$2" | sort | head -n 1; }
 echo
 echo "Look at $folder/metrics/report.html (and $folder/run/overview.png: photograph, rendered volume, depth, error)."
 echo
 echo "For the first camera:"
-echo "  photograph        $(first "$folder/photographs/images" png)"
+echo "  photograph        $(first "$folder/head/images" png)"
 echo "  volume rendered   $(first "$folder/run/render" png)"
 echo "  error             $(first "$folder/run/error" png)"
 echo "  depth             $(first "$folder/run/depth" png)"

@@ -304,10 +304,11 @@ TEST(OpacityMarch, SpentSamplesDoNotDivide) {
   Volume volume = random_volume({1, 1, 1}, 1, 0.01, 0.02, random);
   const PinholeCamera camera = camera_at({4, 4, -16}, {4, 4, 4}, 8, 24);
   const SampleView view = view_of(camera, random_image(8, random), plan_of({1, 60}, 1, {20.0}));
+  const std::vector<ColorTotals> totals(volume.slot_count());
   const auto rays = [&] {
     const LatticeStack stack(volume);
     NodeScratch scratch(stack, volume.tau);
-    scratch.compare_with(std::vector<ColorTotals>(volume.slot_count()));
+    scratch.compare_with(totals);
     return march_opacity(stack, {view}, MarchOptions{}, RunContext(1), scratch).rays;
   };
   EXPECT_EQ(rays(), 16 + 64);
