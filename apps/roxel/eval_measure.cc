@@ -11,6 +11,7 @@
 #include "roxel/io/image_file.h"
 #include "roxel/io/ply_file.h"
 #include "roxel/report/pictures.h"
+#include "roxel/solve/gains.h"
 #include "run_renderer.h"
 #include "view_writer.h"
 
@@ -299,14 +300,29 @@ class Measurement {
 
   void measure_held_out() {
     if (!source_.held_out) return;
+    const bool gains = read_from_summary(source_.run.path, [&] {
+      const nlohmann::json scene = source_.run.summary.value("scene", nlohmann::json::object());
+      return scene.value("light", nlohmann::json::object()).value("illumination", "none") == "gain";
+    });
+    if (gains)
+      out_.notes.push_back("held-out views: one gain a channel fitted to each, as the run did to its own");
     for (const View& view : source_.held_out->dataset.views) {
       session_.context().throw_if_cancelled();
-      const Rendering rendering = renderer()(view, session_.context());
+      Rendering rendering = renderer()(view, session_.context());
       const Photograph photo = source_.held_out->load(view);
+      if (gains) bring_to_light_of(photo, rendering);
       out_.held_out.push_back(quality(view.name,
                                       encoded_picture(rendering.rgb, 1, source_.picture_response()), photo,
                                       object_mask(photo, rendering.opacity)));
     }
+  }
+
+  /// One gain a channel, as the run has fitted to the photographs that it was made from.
+  void bring_to_light_of(const Photograph& photo, Rendering& rendering) {
+    const auto gain = log_gain(photo, rendering, 1, 1);
+    if (!gain) return;
+    for (std::size_t i = 0; i < rendering.rgb.data().size(); ++i)
+      rendering.rgb.data()[i] *= static_cast<float>(std::exp((*gain)[i % 3]));
   }
 
   void measure_colors() {

@@ -303,17 +303,18 @@ class PassTwin {
   }
 
   double prior_opacity(int of) const {
+    std::vector<Eigen::Vector3i> steps;
+    for (int x = -1; x <= 1; ++x)
+      for (int y = -1; y <= 1; ++y)
+        for (int z = -1; z <= 1; ++z)
+          if (x || y || z) steps.emplace_back(x, y, z);
     double best = 0;
-    for (int normal = 0; normal < 3; ++normal) {
+    for (const Eigen::Vector3i& normal : steps) {
       double sum = 0;
-      for (int a = -1; a <= 1; ++a)
-        for (int b = -1; b <= 1; ++b) {
-          Eigen::Vector3i offset(0, 0, 0);
-          offset[(normal + 1) % 3] = a;
-          offset[(normal + 2) % 3] = b;
-          if (!offset.isZero()) sum += alpha(ijk(of) + offset);
-        }
-      best = std::max(best, sum / 8);
+      int count = 0;
+      for (const Eigen::Vector3i& step : steps)
+        if (step.dot(normal) == 0) sum += alpha(ijk(of) + step), ++count;
+      best = std::max(best, sum / count);
     }
     return (1 - options_.prior.spatial_lambda) * options_.prior.opacity +
            options_.prior.spatial_lambda * best;

@@ -171,7 +171,8 @@ TEST(RunPass, OpaqueVolumesDifferByTheEarlyStopAtMost) {
   std::mt19937 random(10);
   Volume volume = random_volume({2, 1, 2}, 0.7, 0.05, 5, random);
   const std::vector<SampleNode> nodes = nodes_around(volume, 4, 16, 1, random);
-  const PassOptions options;
+  PassOptions options;
+  options.prior.strength = 5;
   PassTwin twin(volume, options);
   twin.run(nodes);
   run_pass(nodes, options, RunContext(1), nullptr, volume);

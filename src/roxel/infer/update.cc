@@ -1,6 +1,7 @@
 #include "roxel/infer/update.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "roxel/base/parallel.h"
@@ -13,12 +14,35 @@ namespace {
 constexpr float kLargestTau = 16;
 constexpr std::int64_t kGrain = 1 << 15;
 
-/// Mean of the 8 neighbours in the plane spanned by two strides of the gathered block.
-float plane_mean(const float* centre, int stride_a, int stride_b) {
-  float sum = 0;
-  for (int a = -1; a <= 1; ++a)
-    for (int b = -1; b <= 1; ++b) sum += centre[a * stride_a + b * stride_b];
-  return (sum - *centre) / 8;
+/// The neighbours of a voxel that lie in one plane through it, as offsets in a gathered block.
+struct Sheet {
+  int count = 0;
+  std::array<int, 8> offsets = {};
+};
+
+/// One sheet for every plane whose normal n is a voxel's step to a neighbour: the neighbours o with n o = 0.
+constexpr std::array<Sheet, 13> sheets() {
+  std::array<Sheet, 13> all;
+  for (int normal = 0; normal < 13; ++normal) {  // of n and -n, the one that comes first
+    const int nx = normal % 3 - 1, ny = normal / 3 % 3 - 1, nz = normal / 9 - 1;
+    for (int step = 0; step < 27; ++step) {
+      const int x = step % 3 - 1, y = step / 3 % 3 - 1, z = step / 9 - 1;
+      if (step != 13 && nx * x + ny * y + nz * z == 0)
+        all[normal].offsets[all[normal].count++] = x + kBlockSide * (y + kBlockSide * z);
+    }
+  }
+  return all;
+}
+constexpr std::array<Sheet, 13> kSheets = sheets();
+
+float sheet_opacity(const float* centre) {
+  float best = 0;
+  for (const Sheet& sheet : kSheets) {
+    float sum = 0;
+    for (int k = 0; k < sheet.count; ++k) sum += centre[sheet.offsets[k]];
+    best = std::max(best, sum / static_cast<float>(sheet.count));
+  }
+  return best;
 }
 
 void sheet_prior_of_brick(const BrickIndex& index, int brick_idx, const std::vector<float>& opacity,
@@ -28,16 +52,13 @@ void sheet_prior_of_brick(const BrickIndex& index, int brick_idx, const std::vec
   const Brick& brick = index.bricks()[brick_idx];
   const float lambda = static_cast<float>(prior.spatial_lambda);
   const float base = (1 - lambda) * static_cast<float>(prior.opacity);
-  constexpr int kX = 1, kY = kBlockSide, kZ = kBlockSide * kBlockSide;
   for (int k = 0; k < kBrickSide; ++k)
     for (int j = 0; j < kBrickSide; ++j)
       for (int i = 0; i < kBrickSide; ++i) {
         const std::uint16_t voxel = brick.local[voxel_in_brick(i, j, k)];
         if (voxel == kNoVoxel) continue;
         const float* centre = block + voxel_in_block(i, j, k);
-        const float sheet =
-            std::max({plane_mean(centre, kX, kY), plane_mean(centre, kX, kZ), plane_mean(centre, kY, kZ)});
-        field[brick.first_slot + voxel] = base + lambda * sheet;
+        field[brick.first_slot + voxel] = base + lambda * sheet_opacity(centre);
       }
 }
 

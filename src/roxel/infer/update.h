@@ -10,12 +10,13 @@ namespace roxel {
 /// Gamma prior on optical depth with its mode at a field that knows that surfaces are sheets.
 struct PriorOptions {
   double opacity = 0.02;         ///< alpha_0, in (0, 1)
-  double strength = 5;           ///< beta >= 0, in observations
-  double spatial_lambda = 0.95;  ///< lambda in [0, 1]: weight of the neighbours' opacity in the prior's mode
+  double strength = 1;           ///< beta >= 0, in observations
+  double spatial_lambda = 0.99;  ///< lambda in [0, 1]: weight of the neighbours' opacity in the prior's mode
 };
 
 /// The prior's mode of every voxel, as opacity: (1 - lambda) alpha_0 + lambda * the largest mean opacity of
-/// the voxel's 8 neighbours in one of the three axis planes; absent neighbours count 0.
+/// the voxel's neighbours in one of the 13 planes with a neighbour's direction as normal; absent neighbours
+/// count 0.
 std::vector<float> prior_opacity_field(const Volume& volume, const PriorOptions& prior, int threads);
 
 struct UpdateReport {

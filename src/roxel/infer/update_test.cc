@@ -40,7 +40,7 @@ float prior_at(const Volume& volume, int x, int y, int z, double lambda = kLambd
 double mixed(double sheet) { return (1 - kLambda) * kAlpha0 + kLambda * sheet; }
 
 // A wall x = 7 with opacity 0.6: its voxels have 8 opaque neighbours in the wall's plane; a voxel beside it
-// has 3 of 8 in the two planes that cut the wall. Voxels 7 and 8 lie in different bricks.
+// has 3 of 8 in the planes that cut the wall along a row. Voxels 7 and 8 lie in different bricks.
 TEST(SheetPrior, KnowsAWallAcrossBricks) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto along = [axis](int x, int y, int z) { return axis == 0 ? x : axis == 1 ? y : z; };
@@ -58,30 +58,36 @@ TEST(SheetPrior, KnowsAWallAcrossBricks) {
   }
 }
 
+// Walls that lie askew are sheets as good as those along the axes: every plane n x = c with n in {-1, 0,
+// 1}^3.
+TEST(SheetPrior, KnowsWallsOfAllThirteenDirections) {
+  for (int normal = 0; normal < 13; ++normal) {
+    const Eigen::Vector3i n(normal % 3 - 1, normal / 3 % 3 - 1, normal / 9 - 1);
+    const int through = n.dot(Eigen::Vector3i(7, 8, 7));
+    const Volume volume = volume_where(everywhere, [&](int x, int y, int z) {
+      return n.dot(Eigen::Vector3i(x, y, z)) == through ? 0.6 : 0;
+    });
+    EXPECT_NEAR(prior_at(volume, 7, 8, 7), mixed(0.6), 1e-6) << n.transpose();
+  }
+}
+
 TEST(SheetPrior, AVoxelDoesNotCountItself) {
   const Volume volume =
       volume_where(everywhere, [](int x, int y, int z) { return x == 7 && y == 7 && z == 7 ? 0.9 : 0; });
   EXPECT_NEAR(prior_at(volume, 7, 7, 7), mixed(0), 1e-6);
   EXPECT_NEAR(prior_at(volume, 8, 7, 7), mixed(0.9 / 8), 1e-6);
-  EXPECT_NEAR(prior_at(volume, 8, 8, 7), mixed(0.9 / 8), 1e-6);
-  EXPECT_NEAR(prior_at(volume, 8, 8, 8), mixed(0), 1e-6);  // in none of its three planes
+  EXPECT_NEAR(prior_at(volume, 8, 8, 7), mixed(0.9 / 6), 1e-6);  // in a plane like (1, -1, 1): of 6
+  EXPECT_NEAR(prior_at(volume, 8, 8, 8), mixed(0.9 / 8), 1e-6);
+  EXPECT_NEAR(prior_at(volume, 9, 7, 7), mixed(0), 1e-6);
 }
 
-TEST(SheetPrior, TakesTheBestOfTheThreePlanes) {
+TEST(SheetPrior, TakesTheBestPlane) {
+  // (7, 7, 7) lies in three walls; beside the crossing, at (9, 7, 7), the stronger of two counts.
   const auto alpha = [](int x, int y, int z) { return x == 7 ? 0.3 : y == 7 ? 0.5 : z == 7 ? 0.1 : 0; };
   const Volume volume = volume_where(everywhere, alpha);
-  double best = 0;
-  for (int normal = 0; normal < 3; ++normal) {
-    double sum = 0;
-    for (int a = -1; a <= 1; ++a)
-      for (int b = -1; b <= 1; ++b)
-        if (a || b)
-          sum += normal == 0   ? alpha(6, 7 + a, 7 + b)
-                 : normal == 1 ? alpha(6 + a, 7, 7 + b)
-                               : alpha(6 + a, 7 + b, 7);
-    best = std::max(best, sum / 8);
-  }
-  EXPECT_NEAR(prior_at(volume, 6, 7, 7), mixed(best), 1e-6);
+  EXPECT_NEAR(prior_at(volume, 9, 7, 9), mixed(0.5), 1e-6);
+  EXPECT_NEAR(prior_at(volume, 9, 9, 7), mixed(0.1), 1e-6);
+  EXPECT_NEAR(prior_at(volume, 7, 9, 9), mixed(0.3), 1e-6);
 }
 
 TEST(SheetPrior, AbsentNeighboursCountZero) {

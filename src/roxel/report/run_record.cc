@@ -60,6 +60,10 @@ ordered_json scene_json(const RunRecord& record) {
           {"color_space", to_string(scene.transform.space())},
           {"white_point", to_string(scene.transform.white())},
           {"exposure", scene.exposure},
+          {"light",
+           {{"illumination", scene.light.fits_gains ? "gain" : "none"},
+            {"matching", scene.light.local_matching ? "local" : "canonical"},
+            {"matching_blur_deg", scene.light.blur_deg}}},
           {"background", background_json(scene)}};
 }
 
@@ -80,6 +84,13 @@ ordered_json pass_json(const PassRecord& pass) {
           {"ns_per_step", pass.ns_per_step}};
 }
 
+ordered_json light_json(const LightRecord& light) {
+  return {{"level", light.level},
+          {"pass", light.pass},
+          {"fitted_views", light.fitted_views},
+          {"largest_change", light.largest_change}};
+}
+
 ordered_json level_json(const LevelRecord& level) {
   return {{"voxel_size", level.voxel_size},
           {"voxels_in_box", level.voxels_in_box},
@@ -88,12 +99,20 @@ ordered_json level_json(const LevelRecord& level) {
           {"seconds", level.seconds}};
 }
 
-ordered_json view_json(const ViewFigures& view) {
+ordered_json view_json(const ViewFigures& view, const std::array<float, 3>& light) {
   return {{"name", view.name},
           {"hash", view.hash},
           {"reprojection_rms_percent", or_null(view.reprojection_rms)},
           {"object_pixels", view.object_pixels},
-          {"depth_share", or_null(view.depth_share)}};
+          {"depth_share", or_null(view.depth_share)},
+          {"light", light}};
+}
+
+ordered_json views_json(const RunRecord& record) {
+  ordered_json array = ordered_json::array();
+  for (std::size_t v = 0; v < record.views.size(); ++v)
+    array.push_back(view_json(record.views[v], record.scene.light.of_view(static_cast<int>(v))));
+  return array;
 }
 
 template <class T, class ToJson>
@@ -122,6 +141,7 @@ ordered_json to_json(const RunRecord& record) {
           {"reprojection_rms_percent", or_null(record.reprojection_rms)},
           {"levels", list(summary.levels, level_json)},
           {"passes", list(summary.passes, pass_json)},
+          {"light", list(summary.light, light_json)},
           {"stages", list(summary.stages,
                           [](const StageRecord& s) {
                             return ordered_json{{"name", s.name}, {"seconds", s.seconds}};
@@ -131,7 +151,7 @@ ordered_json to_json(const RunRecord& record) {
           {"peak_memory_bytes", summary.peak_memory_bytes},
           {"notes", summary.notes},
           {"warnings", record.warnings},
-          {"views", list(record.views, view_json)}};
+          {"views", views_json(record)}};
 }
 
 void add_to_hash(const View& view, const std::string& file_hash, std::string& combined) {

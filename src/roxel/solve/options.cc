@@ -116,6 +116,29 @@ void add_color(OptionTable<Options>& table) {
       .help("Compare a ray with what other nodes saw, leaving its own out");
 }
 
+void add_light(OptionTable<Options>& table) {
+  table.group("Light");
+  table
+      .add("illumination", &Options::illumination,
+           {{"auto", IlluminationChoice::kAuto},
+            {"none", IlluminationChoice::kNone},
+            {"gain", IlluminationChoice::kGain}})
+      .help("Light that is divided out of the photographs: none, or one gain an image and channel")
+      .source("[Jethwa04] section 7.2.3; docs/light.md");
+  table
+      .add("matching", &Options::matching,
+           {{"auto", Matching::kAuto}, {"canonical", Matching::kCanonical}, {"local", Matching::kLocal}})
+      .help(
+          "What rays and voxels are compared by: colours under canonical light, or without the light of "
+          "their neighbourhood")
+      .source("docs/light.md");
+  table.add("matching-blur", &Options::matching_blur)
+      .help("Standard deviation of that neighbourhood")
+      .unit("degrees")
+      .range(0.05, 90)
+      .source("measured");
+}
+
 void add_background(OptionTable<Options>& table) {
   table.group("Background");
   table
@@ -180,6 +203,7 @@ OptionTable<Options> make_table() {
   add_volume(table);
   add_sampling(table);
   add_color(table);
+  add_light(table);
   add_background(table);
   add_opacity(table);
   table.rule([](const Options& o) -> std::string {

@@ -9,6 +9,7 @@
 #include "roxel/base/option_table.h"
 #include "roxel/color/color_space.h"
 #include "roxel/infer/passes.h"
+#include "roxel/solve/light.h"
 
 namespace roxel {
 
@@ -52,10 +53,15 @@ struct ReconstructOptions {
   bool filter_rays = false;
   bool filter_background = false;
 
+  // Light
+  IlluminationChoice illumination = IlluminationChoice::kAuto;
+  Matching matching = Matching::kAuto;
+  double matching_blur = 5;  ///< degrees
+
   // Opacity
   UpdateRule update = UpdateRule::kPosterior;
-  double spatial_prior = 0.95;
-  double prior_strength = 1.5;
+  double spatial_prior = 0.99;
+  double prior_strength = 1;
   double prior_opacity = 0.02;
   double acceleration = 12;
   bool ray_weights = false;

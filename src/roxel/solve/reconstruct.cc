@@ -5,6 +5,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/infer/touch.h"
+#include "roxel/solve/gains.h"
 #include "roxel/volume/refine.h"
 
 namespace roxel {
@@ -89,39 +90,121 @@ Accelerate which_steps(const Scene& scene) {
   return open ? Accelerate::kFalling : Accelerate::kBoth;
 }
 
-/// Passes, the first of them drafts, until the opacities rest or the limit is reached; returns whether they
-/// rest. The last pass is never hurried: its opacities follow from its sums alone, which `merge` relies on.
-bool run_passes(const std::vector<SampleNode>& samples, const ReconstructOptions& options, int level,
-                bool first_ever, const RunContext& context, LevelProgress& progress,
-                const ReconstructHooks& hooks, const Scene& scene, Volume& volume, Summary& summary) {
-  PassOptions pass_opts = pass_options(scene, options);
-  const std::vector<SampleNode> drafts = drafts_of(samples);
-  int draft_passes = std::min(options.draft_passes, options.passes - 1);
-  Acceleration acceleration(volume.slot_count(), options.acceleration, which_steps(scene));
-  bool resting = false;
-  for (int pass = 1; pass <= options.passes; ++pass) {
+/// The samples of one level, made again when the light that is divided out has changed.
+class LevelSamples {
+ public:
+  LevelSamples(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
+               const RunContext& context, double voxel_size)
+      : dataset_(dataset), load_(load), options_(options), context_(context), voxel_size_(voxel_size) {}
+
+  void make(const Scene& scene) {
+    samples_ = {};
+    drafts_ = {};
+    samples_ = make_samples(dataset_, load_, scene, voxel_size_, options_, context_);
+    drafts_ = drafts_of(samples_);
+  }
+  const std::vector<SampleNode>& finest() const { return samples_; }
+  const std::vector<SampleNode>& drafts() const { return drafts_; }
+
+  /// Gains anew from the volume's canonical colours; returns whether they moved.
+  bool fit_light(const Volume& volume, Scene& scene, LightRecord& record) {
+    GainFit fit = fit_gains(volume, dataset_, load_, scene, context_);
+    scene.light.of_views = std::move(fit.of_views);
+    record.fitted_views = fit.fitted_views;
+    record.largest_change = fit.largest_change;
+    return fit.largest_change > kGainMoved;
+  }
+
+  /// Gives the voxels the colours of canonical light: those that they are compared by may be others.
+  void paint(const Scene& scene, Volume& volume) const {
+    const LatticeStack stack(volume);
+    const PassOptions pass = pass_options(scene, options_);
+    const std::vector<SampleNode> samples =
+        make_samples(dataset_, load_, scene, voxel_size_, options_, context_, SampleColors::kCanonical);
+    CollectedColors colors(volume.slot_count(), samples.size(), 0);
+    collect_color(stack, samples, pass, context_, nullptr, colors);
+    update_color(colors.of_totals, context_.thread_count(), volume);
+  }
+
+ private:
+  static constexpr double kGainMoved = 0.005;  ///< ratio less 1: below what matching notices
+
+  const Dataset& dataset_;
+  const PhotographLoader& load_;
+  const ReconstructOptions& options_;
+  const RunContext& context_;
+  double voxel_size_;
+  std::vector<SampleNode> samples_, drafts_;
+};
+
+/// One level's passes.
+class LevelPasses {
+ public:
+  LevelPasses(const ReconstructOptions& options, int level, bool first_ever, const RunContext& context,
+              LevelProgress& progress, const ReconstructHooks& hooks)
+      : options_(options),
+        level_(level),
+        first_ever_(first_ever),
+        context_(context),
+        progress_(progress),
+        hooks_(hooks) {}
+
+  /// Passes, the first of them drafts, until the opacities rest or the limit is reached; returns whether they
+  /// rest. The last pass is never hurried, and no light changes after it: its opacities follow from its sums
+  /// alone, which `merge` relies on.
+  bool run(LevelSamples& samples, Scene& scene, Volume& volume, Summary& summary) {
+    int draft_passes = std::min(options_.draft_passes, options_.passes - 1);
+    Acceleration acceleration(volume.slot_count(), options_.acceleration, which_steps(scene));
+    bool resting = false;
+    for (int pass = 1; pass <= options_.passes; ++pass) {
+      const bool draft = pass <= draft_passes;
+      const bool last = resting || pass == options_.passes;
+      const PassRecord& record = run_one(pass, draft, draft ? samples.drafts() : samples.finest(), scene,
+                                         last ? nullptr : &acceleration, volume, summary);
+      const bool rests = record.mean_opacity_change < options_.tolerance;
+      if (last) return resting || rests;
+      if (scene.light.fits_gains) fit_light(pass, samples, scene, volume, summary);
+      if (options_.all_passes || !rests) continue;
+      resting = !draft;
+      draft_passes = std::min(draft_passes, pass);  // drafts say no more: on to the samples themselves
+    }
+    return false;
+  }
+
+ private:
+  const PassRecord& run_one(int pass, bool draft, const std::vector<SampleNode>& samples, const Scene& scene,
+                            Acceleration* acceleration, Volume& volume, Summary& summary) {
     const auto start = Clock::now();
-    const bool draft = pass <= draft_passes;
-    const bool last = resting || pass == options.passes;
-    pass_opts.everywhere = first_ever && pass == 1;
+    PassOptions pass_opts = pass_options(scene, options_);
+    pass_opts.everywhere = first_ever_ && pass == 1;
     const PassReport report = run_pass(
-        draft ? drafts : samples, pass_opts, context,
-        [&](double fraction) { progress.report(level, pass, fraction); }, volume,
-        last ? nullptr : &acceleration);
-    summary.passes.push_back(make_record(level, pass, draft, volume, report, seconds_since(start)));
+        samples, pass_opts, context_, [&](double fraction) { progress_.report(level_, pass, fraction); },
+        volume, acceleration);
+    summary.passes.push_back(make_record(level_, pass, draft, volume, report, seconds_since(start)));
     if (!std::isfinite(report.opacity.log_likelihood))
-      throw NumericalError("level " + std::to_string(level) + ", pass " + std::to_string(pass) +
+      throw NumericalError("level " + std::to_string(level_) + ", pass " + std::to_string(pass) +
                            ": the log-likelihood is not finite; --noise, --outlier or --uninformative are "
                            "far from what colours are like");
-    if (hooks.after_pass) hooks.after_pass(summary.passes.back());
-    const bool rests = report.update.mean_opacity_change < options.tolerance;
-    if (last) return resting || rests;
-    if (options.all_passes || !rests) continue;
-    resting = !draft;
-    draft_passes = std::min(draft_passes, pass);  // drafts say no more: on to the samples themselves
+    if (hooks_.after_pass) hooks_.after_pass(summary.passes.back());
+    return summary.passes.back();
   }
-  return false;
-}
+
+  void fit_light(int pass, LevelSamples& samples, Scene& scene, Volume& volume, Summary& summary) const {
+    if (scene.light.local_matching) samples.paint(scene, volume);
+    LightRecord record;
+    record.level = level_;
+    record.pass = pass;
+    if (samples.fit_light(volume, scene, record)) samples.make(scene);
+    summary.light.push_back(record);
+  }
+
+  const ReconstructOptions& options_;
+  const int level_;
+  const bool first_ever_;
+  const RunContext& context_;
+  LevelProgress& progress_;
+  const ReconstructHooks& hooks_;
+};
 
 }  // namespace
 
@@ -184,17 +267,19 @@ Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
   for (int level = 1; level <= options.levels; ++level) {
     const auto level_start = Clock::now();
     const double voxel_size = std::ldexp(result.scene.voxel_size, options.levels - level);
-    const std::vector<SampleNode> samples =
-        make_samples(dataset, load, result.scene, voxel_size, options, context);
-    result.volume = level == 1 ? first_volume(result.scene, samples, options, context, hooks.initial)
+    LevelSamples samples(dataset, load, options, context, voxel_size);
+    samples.make(result.scene);
+    result.volume = level == 1 ? first_volume(result.scene, samples.finest(), options, context, hooks.initial)
                                : refine(result.volume, refine_options(options), context.thread_count());
     LevelRecord record;
     record.voxel_size = voxel_size;
     record.voxels_in_box = result.volume.box_slot_count();
     record.voxels_around = result.volume.slot_count() - result.volume.box_slot_count();
     const bool first_ever = level == 1 && !hooks.initial;
-    record.converged = run_passes(samples, options, level, first_ever, context, progress, hooks, result.scene,
-                                  result.volume, summary);
+    record.converged = LevelPasses(options, level, first_ever, context, progress, hooks)
+                           .run(samples, result.scene, result.volume, summary);
+    if (result.scene.light.local_matching && level == options.levels)
+      samples.paint(result.scene, result.volume);
     record.seconds = seconds_since(level_start);
     summary.levels.push_back(record);
     if (hooks.after_level) hooks.after_level(result.volume, result.scene, summary);

@@ -40,6 +40,7 @@ class ViewStages {
       if (stages_.depth) add_depth(node, worker, results);
       for (ViewResult& result : results) {
         if (stages_.render && !stages_.depth) result.rendering = render_view(result.view_idx);
+        put_into_light_of(result.view_idx, result.rendering.rgb);
         visit(result);
         report_one();
       }
@@ -79,6 +80,12 @@ class ViewStages {
   Rendering render_view(int view_idx) const {
     return render(stack_, colors_, dataset_.views[view_idx].camera, view_range(scene_, dataset_, view_idx),
                   render_options(), context_);
+  }
+
+  /// Canonical colours as the view's photograph shows them.
+  void put_into_light_of(int view_idx, Image& rgb) const {
+    const std::array<float, 3> light = scene_.light.of_view(view_idx);
+    for (std::size_t i = 0; i < rgb.data().size(); ++i) rgb.data()[i] *= light[i % 3];
   }
 
   void report_one() {

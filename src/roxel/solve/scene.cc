@@ -81,10 +81,12 @@ double choose_exposure(std::vector<float> luminances, std::vector<std::string>& 
   return exposure;
 }
 
-Image matching_image(const Photograph& photo, const Scene& scene) {
-  Image samples = photo.rgb;
-  const float scale = static_cast<float>(1 / scene.exposure);
-  for (float& value : samples.data()) value *= scale;
+Image sample_image(const Dataset& dataset, int view_idx, const Photograph& photo, const Scene& scene,
+                   SampleColors colors) {
+  const double focal_px = dataset.views[view_idx].camera.intrinsics.fx;
+  Image samples = colors == SampleColors::kCanonical
+                      ? canonical_image(photo, view_idx, scene.exposure, scene.light)
+                      : matching_image(photo, view_idx, focal_px, scene.exposure, scene.light);
   scene.transform.from_rgb_in_place(samples.data().data(), samples.data().size() / 3);
   for (float& value : samples.data()) value = std::clamp(value, -kLargestComponent, kLargestComponent);
   return samples;
@@ -133,6 +135,9 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
   scene.notes.push_back("bounds: " + scene.bounds.how);
   scene.transform =
       ColorTransform(options.color_space, parse_white_point(options.white_point, "--white-point"));
+  scene.light.fits_gains = options.illumination == IlluminationChoice::kGain;
+  scene.light.local_matching = options.matching == Matching::kLocal;
+  scene.light.blur_deg = options.matching_blur;
   scene.model = make_model(options);
   scene.background.unknown_likelihood = static_cast<float>(
       unknown_color_likelihood(options.color_space, std::sqrt(scene.model.noise_variance[0])));
@@ -184,7 +189,7 @@ Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx) {
 
 std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
                                      double voxel_size, const ReconstructOptions& options,
-                                     const RunContext& context) {
+                                     const RunContext& context, SampleColors colors) {
   std::vector<SampleView> views(dataset.views.size());
   parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
     context.throw_if_cancelled();
@@ -199,9 +204,9 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
     const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
     view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
     const Photograph photo = load(dataset.views[v]);
-    view.pyramid =
-        std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground,
-                                        view.plan.finest_level, view.draft_plan.root_level);
+    view.pyramid = std::make_shared<SamplePyramid>(
+        sample_image(dataset, static_cast<int>(v), photo, scene, colors), photo.valid, photo.foreground,
+        view.plan.finest_level, view.draft_plan.root_level);
   });
   std::vector<SampleNode> nodes(dataset.nodes.size());
   for (std::size_t v = 0; v < views.size(); ++v)
@@ -220,7 +225,8 @@ SampleView make_full_view(const Dataset& dataset, int view_idx, const Photograph
   view.camera = dataset.views[view_idx].camera;
   view.plan.range = view_range(scene, dataset, view_idx);
   view.pyramid =
-      std::make_shared<SamplePyramid>(matching_image(photo, scene), photo.valid, photo.foreground, 0, 0);
+      std::make_shared<SamplePyramid>(sample_image(dataset, view_idx, photo, scene, SampleColors::kMatching),
+                                      photo.valid, photo.foreground, 0, 0);
   return view;
 }
 

@@ -14,6 +14,7 @@ struct Scene {
   bool seen_from_inside = false;  ///< a camera stands in the box
   ColorTransform transform;       ///< linear RGB / exposure <-> matching space
   double exposure = 1;            ///< radiance that counts as display white; 1 for 8- and 16-bit images
+  Light light;                    ///< divided out of the photographs
   MatchModel model;
   Background background;
   std::vector<std::string> notes;     ///< what was chosen and why, for people
@@ -31,10 +32,15 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
 /// The frames of the coarsest level's lattices: box first, then surround.
 std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options);
 
+/// Which of a photograph's colours samples hold: those that rays and voxels are compared by, or those that
+/// voxels are painted with.
+enum class SampleColors { kMatching, kCanonical };
+
 /// Loads all views, and prepares their samples for voxels of `voxel_size`.
 std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
                                      double voxel_size, const ReconstructOptions& options,
-                                     const RunContext& context);
+                                     const RunContext& context,
+                                     SampleColors colors = SampleColors::kMatching);
 
 /// The same nodes with their draft plans as plans.
 std::vector<SampleNode> drafts_of(std::vector<SampleNode> nodes);

@@ -24,6 +24,14 @@ struct PassRecord {
   double ns_per_step = 0;      ///< of the opacity march alone, per core
 };
 
+/// One fit of the photographs' light, after a pass.
+struct LightRecord {
+  int level = 0;
+  int pass = 0;
+  int fitted_views = 0;
+  double largest_change = 0;  ///< of any view's light and channel, as a ratio less 1
+};
+
 struct LevelRecord {
   double voxel_size = 0;
   std::int64_t voxels_in_box = 0;
@@ -41,6 +49,7 @@ struct Summary {
   std::string termination;  ///< "converged" or "pass limit"
   std::vector<LevelRecord> levels;
   std::vector<PassRecord> passes;
+  std::vector<LightRecord> light;
   std::vector<StageRecord> stages;
   std::vector<std::string> notes;
   double seconds = 0;

@@ -1,0 +1,141 @@
+#include "roxel/solve/gains.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "roxel/base/parallel.h"
+#include "roxel/march/render.h"
+#include "roxel/solve/run_stages.h"
+
+namespace roxel {
+
+namespace {
+
+constexpr int kSide = 96;               ///< pixels along the longer side at which views are compared
+constexpr float kCovered = 0.7f;        ///< opacity of a pixel that shows the volume
+constexpr float kDarkest = 0.01f;       ///< canonical; below, noise and black level decide the ratio
+constexpr float kBrightest = 0.98f;     ///< of a display image's full scale: clipped
+constexpr std::size_t kFewestPixels = 32;
+constexpr double kHuber = 1.345;        ///< standard deviations: 95 % efficiency on Gaussian errors
+
+/// Robust mean: Huber's, by reweighting, with the median absolute deviation as scale.
+double huber_mean(std::vector<double> values) {
+  const auto median = [](std::vector<double>& of) {
+    const auto middle = of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2);
+    std::nth_element(of.begin(), middle, of.end());
+    return *middle;
+  };
+  double mean = median(values);
+  std::vector<double> deviations(values.size());
+  std::transform(values.begin(), values.end(), deviations.begin(),
+                 [mean](double value) { return std::abs(value - mean); });
+  const double limit = kHuber * std::max(1e-6, 1.4826 * median(deviations));
+  for (int round = 0; round < 10; ++round) {
+    double sum = 0, weights = 0;
+    for (const double value : values) {
+      const double weight = std::min(1.0, limit / std::max(1e-12, std::abs(value - mean)));
+      sum += weight * value, weights += weight;
+    }
+    mean = sum / weights;
+  }
+  return mean;
+}
+
+PinholeCamera shrunk(const PinholeCamera& camera, int factor) {
+  PinholeCamera small = camera;
+  Intrinsics& k = small.intrinsics;
+  k.width = std::max(1, k.width / factor), k.height = std::max(1, k.height / factor);
+  k.fx /= factor, k.fy /= factor, k.cx /= factor, k.cy /= factor, k.skew /= factor;
+  return small;
+}
+
+/// Mean of the block's pixels, per channel; false where one of them is unusable, background or clipped.
+bool block_mean(const Photograph& photo, float clipped, int factor, int x, int y, std::array<double, 3>& mean) {
+  mean = {0, 0, 0};
+  for (int v = y * factor; v < (y + 1) * factor; ++v)
+    for (int u = x * factor; u < (x + 1) * factor; ++u) {
+      if (!photo.valid.empty() && photo.valid.at(u, v) < 255) return false;
+      if (!photo.foreground.empty() && photo.foreground.at(u, v) < 255) return false;
+      const float* pixel = photo.rgb.pixel(u, v);
+      for (int c = 0; c < 3; ++c) {
+        if (pixel[c] >= clipped) return false;
+        mean[c] += pixel[c] / (factor * factor);
+      }
+    }
+  return true;
+}
+
+/// One view's, or nothing where it shows too little.
+std::optional<std::array<double, 3>> fit_view(const LatticeStack& stack,
+                                              const std::vector<std::array<float, 3>>& colors,
+                                              const Dataset& dataset, int view_idx, const Photograph& photo,
+                                              const Scene& scene) {
+  const PinholeCamera& camera = dataset.views[view_idx].camera;
+  const int factor = std::max(1, std::max(camera.intrinsics.width, camera.intrinsics.height) / kSide);
+  RenderOptions box_alone;
+  box_alone.surround = false;
+  const Rendering rendering = render(stack, colors, shrunk(camera, factor),
+                                     view_range(scene, dataset, view_idx), box_alone, RunContext(1));
+  return log_gain(photo, rendering, factor, scene.exposure);
+}
+
+}  // namespace
+
+std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Rendering& rendering, int factor,
+                                              double exposure) {
+  const float clipped = exposure == 1 ? kBrightest : std::numeric_limits<float>::infinity();
+  const float darkest = kDarkest * static_cast<float>(exposure);
+  std::array<std::vector<double>, 3> ratios;
+  for (int y = 0; y < rendering.opacity.height(); ++y)
+    for (int x = 0; x < rendering.opacity.width(); ++x) {
+      const float opacity = *rendering.opacity.pixel(x, y);
+      std::array<double, 3> seen;
+      if (opacity < kCovered || !block_mean(photo, clipped, factor, x, y, seen)) continue;
+      const float* rendered = rendering.rgb.pixel(x, y);
+      for (int c = 0; c < 3; ++c)
+        if (rendered[c] > darkest * opacity && seen[c] > 0)
+          ratios[c].push_back(std::log(seen[c] * opacity / rendered[c]));
+    }
+  std::array<double, 3> gain;
+  for (int c = 0; c < 3; ++c) {
+    if (ratios[c].size() < kFewestPixels) return std::nullopt;
+    gain[c] = huber_mean(std::move(ratios[c]));
+  }
+  return gain;
+}
+
+GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
+                  const Scene& scene, const RunContext& context) {
+  const LatticeStack stack(volume);
+  const std::vector<std::array<float, 3>> colors =
+      radiance_colors(volume, scene.transform, scene.exposure);
+  const int views = static_cast<int>(dataset.views.size());
+  std::vector<std::array<double, 3>> logs(views);
+  std::vector<char> fitted(views, 0);
+  parallel_for(views, context.thread_count(), [&](std::int64_t v, int) {
+    context.throw_if_cancelled();
+    const int view = static_cast<int>(v);
+    const std::array<float, 3> before = scene.light.of_view(view);
+    const auto gain = fit_view(stack, colors, dataset, view, load(dataset.views[view]), scene);
+    fitted[view] = gain.has_value();
+    for (int c = 0; c < 3; ++c) logs[view][c] = gain ? (*gain)[c] : std::log(static_cast<double>(before[c]));
+  });
+  GainFit fit;
+  std::array<double, 3> mean{0, 0, 0};
+  for (int v = 0; v < views; ++v) {
+    fit.fitted_views += fitted[v];
+    for (int c = 0; c < 3; ++c) mean[c] += logs[v][c] / views;
+  }
+  fit.of_views.resize(views);
+  for (int v = 0; v < views; ++v)
+    for (int c = 0; c < 3; ++c) {
+      const double gain = std::exp(logs[v][c] - mean[c]);
+      fit.of_views[v][c] = static_cast<float>(gain);
+      fit.largest_change =
+          std::max(fit.largest_change, std::abs(gain / scene.light.of_view(v)[c] - 1));
+    }
+  return fit;
+}
+
+}  // namespace roxel

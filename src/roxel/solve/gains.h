@@ -1,0 +1,31 @@
+#pragma once
+/// One gain an image and channel, so that photographs without a usable sky come to one light: exposure, white
+/// balance and the light's strength and tint together (docs/light.md).
+
+#include <optional>
+
+#include "roxel/march/render.h"
+#include "roxel/solve/scene.h"
+#include "roxel/volume/volume.h"
+
+namespace roxel {
+
+struct GainFit {
+  std::vector<std::array<float, 3>> of_views;  ///< geometric mean over the views 1 in every channel
+  int fitted_views = 0;      ///< the others show too little of the volume, and keep what they had
+  double largest_change = 0; ///< of any view and channel, as a ratio less 1
+};
+
+/// What lies between a photograph and how the volume renders it: per channel the robust (Huber) mean of
+/// log(photograph / rendering), over blocks of factor x factor photographed pixels that the volume covers and
+/// that are neither masked, clipped nor dark; nothing where there are fewer than 32. The rendering has one
+/// pixel a block, its `rgb` and `opacity` over the box alone; `exposure` is the radiance of display white.
+std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Rendering& rendering, int factor,
+                                              double exposure);
+
+/// Gains that bring the volume's colours nearest to the photographs, by log_gain at about 96 pixels along
+/// the longer side. `volume` holds canonical colours. Every image is read once.
+GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
+                  const Scene& scene, const RunContext& context);
+
+}  // namespace roxel

@@ -1,0 +1,151 @@
+#include "roxel/solve/gains.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <mutex>
+
+#include "roxel/solve/cube_fixture.h"
+#include "roxel/solve/run_stages.h"
+
+namespace roxel {
+namespace {
+
+using fixture::cube_dataset;
+using fixture::CubeWorld;
+
+ReconstructOptions cube_options(IlluminationChoice illumination, Matching matching) {
+  ReconstructOptions options;
+  options.bounds = {-0.8, -0.8, -0.8, 0.8, 0.8, 0.8};
+  options.resolution = 32;
+  options.levels = 2;
+  options.passes = 5;
+  options.illumination = illumination;
+  options.matching = matching;
+  return options;
+}
+
+/// What the views' exposures and white balances are: up to a factor of about two apart.
+std::array<float, 3> true_light(int view) {
+  const float exposure = std::exp2(std::sin(2.4f * static_cast<float>(view)) / 2);
+  const float tint = 1 + 0.2f * std::sin(1.7f * static_cast<float>(view) + 1);
+  return {exposure * tint, exposure, exposure / tint};
+}
+
+/// Photographs of the cube with masks, each in its own light.
+PhotographLoader lit_loader(const Dataset& dataset) {
+  return [&dataset](const View& view) {
+    Photograph photo = CubeWorld::photograph(view.camera, std::array<float, 3>{0, 0, 0}, true);
+    const std::array<float, 3> light = true_light(static_cast<int>(&view - dataset.views.data()));
+    for (std::size_t i = 0; i < photo.rgb.data().size(); ++i) photo.rgb.data()[i] *= 0.4f * light[i % 3];
+    return photo;
+  };
+}
+
+/// Share of the cube's pixels whose depth is within half a voxel.
+double share_near(const Dataset& dataset, const PhotographLoader& load, const Reconstruction& made,
+                  const ReconstructOptions& options) {
+  std::mutex mutex;
+  RunContext context(2);
+  ViewStageOptions stages;
+  stages.render = false;
+  double near = 0, all = 0;
+  for_each_view_result(dataset, load, made, options, stages, context, [&](const ViewResult& result) {
+    const std::lock_guard lock(mutex);
+    const PinholeCamera& camera = dataset.views[result.view_idx].camera;
+    for (int y = 0; y < camera.intrinsics.height; ++y)
+      for (int x = 0; x < camera.intrinsics.width; ++x)
+        if (const std::optional<double> truth = CubeWorld::hit(camera.ray(x + 0.5, y + 0.5))) {
+          ++all;
+          near += *result.depth.opacity.pixel(x, y) > 0.5f &&
+                  std::abs(*result.depth.depth.pixel(x, y) - *truth) < 0.5 * made.scene.voxel_size;
+        }
+  });
+  return near / all;
+}
+
+Reconstruction run(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options) {
+  RunContext context(2);
+  return reconstruct(dataset, load, options, context);
+}
+
+/// Root mean square of log(colour / the cube's own colour) over opaque voxels, one scale for all left free.
+double color_spread(const Reconstruction& made) {
+  const auto colors = radiance_colors(made.volume, made.scene.transform, made.scene.exposure);
+  const BrickIndex& index = made.volume.index(0);
+  double sum = 0, squares = 0;
+  int count = 0;
+  for (const Brick& brick : index.bricks())
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (brick.local[v] == kNoVoxel) continue;
+      const std::uint32_t slot = brick.first_slot + brick.local[v];
+      if (alpha_from_tau(made.volume.tau[slot]) < 0.5f) continue;
+      const Eigen::Vector3d at =
+          index.frame().voxel_centre(kBrickSide * brick.coord + Eigen::Vector3i(v % 8, v / 8 % 8, v / 64));
+      if (at.cwiseAbs().maxCoeff() > 0.5) continue;
+      const std::array<float, 3> truth = CubeWorld::color_at(at);
+      const double ratio = std::log(std::max(1e-3f, colors[slot][1]) / truth[1]);
+      sum += ratio, squares += ratio * ratio, ++count;
+    }
+  return std::sqrt(squares / count - sum * sum / count / count);
+}
+
+TEST(FitGains, FindsTheLightOfEveryPhotograph) {
+  const Dataset dataset = cube_dataset(14, 48);
+  const PhotographLoader load = lit_loader(dataset);
+  const ReconstructOptions none = cube_options(IlluminationChoice::kNone, Matching::kCanonical);
+  const ReconstructOptions gain = cube_options(IlluminationChoice::kGain, Matching::kCanonical);
+  const Reconstruction without = run(dataset, load, none), with = run(dataset, load, gain);
+
+  std::array<double, 3> mean{0, 0, 0};
+  for (int v = 0; v < 14; ++v)
+    for (int c = 0; c < 3; ++c) mean[c] += std::log(true_light(v)[c]) / 14;
+  for (int v = 0; v < 14; ++v)
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(std::log(with.scene.light.of_views[v][c]), std::log(true_light(v)[c]) - mean[c], 0.06)
+          << "view " << v << " channel " << c;
+  EXPECT_TRUE(without.scene.light.of_views.empty());
+  EXPECT_FALSE(with.summary.light.empty());
+  EXPECT_GT(with.summary.light.front().largest_change, with.summary.light.back().largest_change);
+  EXPECT_GT(share_near(dataset, load, with, gain), share_near(dataset, load, without, none) + 0.05);
+}
+
+TEST(FitGains, RendersAreInThePhotographsOwnLight) {
+  const Dataset dataset = cube_dataset(14, 48);
+  const PhotographLoader load = lit_loader(dataset);
+  const ReconstructOptions gain = cube_options(IlluminationChoice::kGain, Matching::kCanonical);
+  const Reconstruction made = run(dataset, load, gain);
+  ViewStageOptions stages;
+  stages.depth = false;
+  RunContext context(1);
+  for_each_view_result(dataset, load, made, gain, stages, context, [&](const ViewResult& result) {
+    double photographed = 0, rendered = 0;
+    for (std::size_t i = 0; i < result.photo.foreground.data().size(); ++i)
+      if (result.photo.foreground.data()[i] == 255) {
+        photographed += result.photo.rgb.data()[3 * i];
+        rendered += result.rendering.rgb.data()[3 * i];
+      }
+    EXPECT_NEAR(rendered / photographed, 1, 0.08) << result.view_idx;
+  });
+}
+
+TEST(LocalMatching, FindsTheSurfaceWithoutGains) {
+  const Dataset dataset = cube_dataset(14, 48);
+  const PhotographLoader load = lit_loader(dataset);
+  const ReconstructOptions canonical = cube_options(IlluminationChoice::kNone, Matching::kCanonical);
+  const ReconstructOptions local = cube_options(IlluminationChoice::kNone, Matching::kLocal);
+  EXPECT_GT(share_near(dataset, load, run(dataset, load, local), local),
+            share_near(dataset, load, run(dataset, load, canonical), canonical) + 0.05);
+}
+
+TEST(LocalMatching, PaintsInCanonicalLight) {
+  const Dataset dataset = cube_dataset(14, 48);
+  const PhotographLoader load = fixture::cube_loader(std::array<float, 3>{0, 0, 0}, true);
+  const auto spread = [&](Matching matching) {
+    return color_spread(run(dataset, load, cube_options(IlluminationChoice::kNone, matching)));
+  };
+  EXPECT_LT(spread(Matching::kLocal), 1.05 * spread(Matching::kCanonical));
+}
+
+}  // namespace
+}  // namespace roxel

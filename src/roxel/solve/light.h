@@ -1,0 +1,35 @@
+#pragma once
+/// The light that is divided out of the photographs before they are compared and before voxels are painted
+/// (docs/light.md; [Jethwa04] section 7.2.3).
+
+#include <array>
+#include <vector>
+
+#include "roxel/dataset/dataset.h"
+
+namespace roxel {
+
+enum class IlluminationChoice { kAuto, kNone, kGain };
+enum class Matching { kAuto, kCanonical, kLocal };
+
+/// A photograph's radiance is canonical colour times exposure times the view's light, per channel.
+struct Light {
+  std::vector<std::array<float, 3>> of_views;  ///< one a view; empty: 1 for all
+  bool fits_gains = false;                     ///< `of_views` follows the volume from pass to pass
+  bool local_matching = false;                 ///< colours are compared without their neighbourhood's light
+  double blur_deg = 5;                         ///< standard deviation of that neighbourhood
+
+  std::array<float, 3> of_view(int view_idx) const {
+    return of_views.empty() ? std::array<float, 3>{1, 1, 1} : of_views[view_idx];
+  }
+};
+
+/// Linear RGB under canonical light; 1 = white at `exposure` (radiance units).
+Image canonical_image(const Photograph& photo, int view_idx, double exposure, const Light& light);
+
+/// What the view is compared by, linear RGB: the canonical image, or that without local light. `focal_px` is
+/// the camera's.
+Image matching_image(const Photograph& photo, int view_idx, double focal_px, double exposure,
+                     const Light& light);
+
+}  // namespace roxel
