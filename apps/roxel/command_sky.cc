@@ -177,7 +177,8 @@ ordered_json summary_json(const Invocation& invocation, const SkyInput& input, c
     skies.push_back(report.json);
     for (const std::string& warning : report.warnings) warnings.push_back(warning);
   }
-  return {{"version", ROXEL_VERSION},
+  return {{"format", kSummaryFormat},
+          {"version", ROXEL_VERSION},
           {"command", invocation.line},
           {"dataset", {{"path", input.path}, {"format", input.format}, {"images", images}, {"nodes", input.tasks.size()}}},
           {"options", options},
