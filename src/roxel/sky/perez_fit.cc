@@ -32,6 +32,19 @@ struct RelativeError {
   }
 };
 
+/// (p - prior) / usual spread, of a to h.
+struct PriorError {
+  Parameters prior;
+  double strength;
+
+  template <class T>
+  bool operator()(const T* p, T* residual) const {
+    constexpr double kSpread[6] = {1, 0.3, 5, 2, 0.5, 0.3};
+    for (int i = 0; i < 6; ++i) residual[i] = std::sqrt(2 * strength) * (p[i + 1] - prior[i + 1]) / kSpread[i];
+    return true;
+  }
+};
+
 Parameters parameters_of(const PerezShape& s, double scale) {
   Parameters p{std::log(std::max(scale, 1e-20)), s.a, s.b, s.c, s.d, s.e, s.h};
   for (int i = 0; i < kParameters; ++i) p[i] = std::clamp(p[i], kLow[i], kHigh[i]);
@@ -74,7 +87,8 @@ std::vector<int> fixed_parameters(PerezFreedom freedom) {
 }
 
 /// Runs Ceres from `p`; returns the robust cost per weight.
-double minimise(const std::vector<Seen>& seen, const PerezFitOptions& options, int iterations, Parameters& p) {
+double minimise(const std::vector<Seen>& seen, const PerezFitOptions& options, const Parameters& prior,
+                int iterations, Parameters& p) {
   ceres::Problem problem;
   double total = 0;
   for (const Seen& s : seen) total += s.weight;
@@ -84,6 +98,10 @@ double minimise(const std::vector<Seen>& seen, const PerezFitOptions& options, i
         new ceres::AutoDiffCostFunction<RelativeError, 1, kParameters>(new RelativeError{s, 1.0}),
         new ceres::ScaledLoss(new ceres::CauchyLoss(options.loss_scale), s.weight / total, ceres::TAKE_OWNERSHIP),
         p.data());
+  if (options.prior_strength > 0)
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorError, 6, kParameters>(
+                                 new PriorError{prior, options.prior_strength}),
+                             nullptr, p.data());
   for (int i = 0; i < kParameters; ++i) {
     problem.SetParameterLowerBound(p.data(), i, kLow[i]);
     problem.SetParameterUpperBound(p.data(), i, kHigh[i]);
@@ -133,19 +151,20 @@ PerezFit fit_perez(const std::vector<SkySample>& samples, int channel, const Eig
   const std::vector<Seen> few = thinned(all, kStartSamples), many = thinned(all, options.most_samples);
   PerezFit best;
   double best_cost = std::numeric_limits<double>::infinity();
-  Parameters best_parameters{};
+  Parameters best_parameters{}, best_prior{};
   for (std::size_t i = 0; i < options.starts.size(); ++i) {
     const PerezShape shape = start_shape(options.starts[i], options.freedom);
     Parameters p = parameters_of(shape, scale_of(shape, few));
+    const Parameters prior = options.prior ? parameters_of(start_shape(*options.prior, options.freedom), 1) : p;
     const double cost = options.freedom == PerezFreedom::kScaleOnly
                             ? mean_error(channel_of(p), few)
-                            : minimise(few, options, options.iterations / 2, p);
-    if (cost < best_cost || i == 0) best_cost = cost, best_parameters = p, best.start = static_cast<int>(i);
+                            : minimise(few, options, prior, options.iterations / 2, p);
+    if (cost < best_cost || i == 0) best_cost = cost, best_parameters = p, best_prior = prior, best.start = static_cast<int>(i);
   }
   if (options.freedom == PerezFreedom::kScaleOnly)
     best_parameters[0] = std::log(scale_of(channel_of(best_parameters).shape, many));
   else
-    minimise(many, options, options.iterations, best_parameters);
+    minimise(many, options, best_prior, options.iterations, best_parameters);
   best.channel = channel_of(best_parameters);
   best.mean_error = mean_error(best.channel, all);
   return best;
@@ -156,6 +175,9 @@ std::vector<PerezShape> published_starts(const Eigen::Vector3d& sun) {
   std::vector<PerezShape> starts;
   for (int bin = 0; bin < kClearnessBins; ++bin)
     starts.push_back(published_perez(bin, zenith, usual_brightness(bin)));
+  starts.push_back({4, -0.7, 0, -1, 0, 1});      // CIE 1: overcast, three times brighter at the zenith
+  starts.push_back({0, -1, 0, -1, 0, 1});        // CIE 5: uniform
+  starts.push_back({-1, -0.32, 10, -3, 0.45, 1});  // CIE 12: clear, clean air
   return starts;
 }
 

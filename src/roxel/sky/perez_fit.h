@@ -2,6 +2,7 @@
 /// Fits the all-weather sky to radiances, one channel at a time.
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "roxel/sky/perez.h"
@@ -26,6 +27,8 @@ enum class PerezFreedom {
 struct PerezFitOptions {
   PerezFreedom freedom = PerezFreedom::kFull;
   std::vector<PerezShape> starts;  ///< at least one; see published_starts
+  double prior_strength = 0;       ///< holds the shape near its prior: matters where no sample is
+  std::optional<PerezShape> prior; ///< unset: the start
   double loss_scale = 0.05;        ///< relative errors above it count less and less (Cauchy)
   int iterations = 60;             ///< of the refinement; each start gets half as many on fewer samples
   int most_samples = 4000;         ///< more are thinned out evenly
@@ -42,7 +45,7 @@ struct PerezFit {
 PerezFit fit_perez(const std::vector<SkySample>& samples, int channel, const Eigen::Vector3d& sun,
                    const PerezFitOptions& options);
 
-/// The eight published skies for a sun.
+/// The eight published skies for a sun, and CIE's standard overcast, uniform and clear skies [CIE03].
 std::vector<PerezShape> published_starts(const Eigen::Vector3d& sun);
 
 }  // namespace roxel

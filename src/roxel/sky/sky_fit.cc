@@ -16,7 +16,11 @@ constexpr double kHemisphere = 2 * kPi;
 constexpr double kNightDeg = -6;          ///< civil twilight ends
 constexpr double kLeastShare = 0.0005;    ///< of the hemisphere, for any model
 constexpr double kShareForShape = 0.03;   ///< of the hemisphere, for free parameters
-constexpr double kAgreeSigmas = 3;
+/// Of log radiance: no model fits better everywhere, and none is good near the horizon.
+constexpr double kAgreeSigmas = 3, kAlwaysAgrees = 0.12, kAtHorizon = 0.5, kHorizonDeg = 6;
+constexpr double kPriorStrength = 2e-6;
+/// Regions apart from the sky's (gaps, arches) must be about as bright and of that colour: windows are darker.
+constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
 
@@ -173,13 +177,17 @@ class Fitting {
   void fit_channels() {
     const std::vector<SkySample> seen = samples();
     PerezFitOptions fit;
+    fit.prior_strength = kPriorStrength;
     fit.freedom = options_.free_exponent ? PerezFreedom::kExponent : PerezFreedom::kFull;
     if (sky().model == SkyModel::kPublished || sky().model == SkyModel::kUniform) fit.freedom = PerezFreedom::kScaleOnly;
     if (sky().model == SkyModel::kGradation) fit.freedom = PerezFreedom::kGradation;
     for (int c = 0; c < 3; ++c) {
       fit.starts = sky().model == SkyModel::kUniform ? std::vector<PerezShape>{PerezShape{}} : published_starts(sky().sun);
-      if (out_.rounds > 0) fit.starts = {sky().channels[c].shape};
-      sky().channels[c] = fit_perez(seen, c, sky().sun, fit).channel;
+      if (out_.rounds > 0) fit.starts = {sky().channels[c].shape}, fit.prior = prior_[c];
+      const std::vector<PerezShape> starts = fit.starts;
+      const PerezFit fitted = fit_perez(seen, c, sky().sun, fit);
+      sky().channels[c] = fitted.channel;
+      if (out_.rounds == 0) prior_[c] = starts[fitted.start];
     }
     fit_residual(seen);
     find_sigma(seen);
@@ -225,9 +233,18 @@ class Fitting {
   }
 
   bool agrees(int f) const {
-    const Eigen::Vector3d error =
-        log_ratio(sphere_->centre(f), out_.light.facets[f].mean).cwiseQuotient(out_.sky.relative_sigma);
-    return error.cwiseAbs().maxCoeff() < kAgreeSigmas;
+    const Eigen::Array3d error = log_ratio(sphere_->centre(f), out_.light.facets[f].mean).array().abs();
+    const double elevation = std::asin(sphere_->centre(f).z()) / kDegree;
+    const double always = kAlwaysAgrees + kAtHorizon * std::exp(-elevation / kHorizonDeg);
+    return (error < (kAgreeSigmas * out_.sky.relative_sigma.array()).max(always)).all();
+  }
+
+  bool may_be_sky(const std::vector<int>& region) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const int f : region) sum += log_ratio(sphere_->centre(f), out_.light.facets[f].mean);
+    const Eigen::Vector3d mean = sum / static_cast<double>(region.size());
+    const double brightness = mean.mean();
+    return std::abs(brightness) < kApartBrightness && (mean.array() - brightness).abs().maxCoeff() < kApartColor;
   }
 
   /// Facets that agree with the model and hang together with those that were used.
@@ -242,6 +259,9 @@ class Fitting {
     };
     for (int f = 0; f < sphere_->count(); ++f)
       if (out_.used[f] && out_.masks.sky[f]) take(f);
+    for (const std::vector<int>& region : out_.masks.apart)
+      if (may_be_sky(region))
+        for (const int f : region) take(f);
     for (std::size_t i = 0; i < queue.size(); ++i)
       for (const int next : sphere_->neighbours(queue[i])) take(next);
     return agreeing;
@@ -271,6 +291,7 @@ class Fitting {
     PerezFitOptions fit;
     fit.freedom = PerezFreedom::kScaleOnly;
     fit.starts = published_starts(sky().sun);
+    fit.starts.resize(kClearnessBins);
     sky().clearness_bin = known_sun() ? fit_perez(samples(), 1, sky().sun, fit).start : 0;
   }
 
@@ -314,6 +335,7 @@ class Fitting {
   const SkyFitOptions& options_;
   std::shared_ptr<const FacetSphere> sphere_;
   std::vector<SunMeasure> measures_;
+  std::array<PerezShape, 3> prior_;
   SkyFit out_;
 };
 

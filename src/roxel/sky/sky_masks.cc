@@ -12,6 +12,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kNearSunDeg = 3, kGlareDeg = 10;
 constexpr double kBorneOut = 0.8;  ///< share of the surest region that must pass a mask for it to be used
+constexpr double kSureShare = 0.1;  ///< of the surest region's area: others need not be doubted
 constexpr double kLeastRegion = 0.0015;  ///< steradians: smaller regions are windows and gaps (5 square degrees)
 
 struct Region {
@@ -137,8 +138,11 @@ class Masking {
       const bool blue = !out_.red_blue_used || region.blue >= kBorneOut * region.area;
       const bool bright = !out_.luminance_used || region.bright >= kBorneOut * region.area;
       // A region that is much smaller is a wall or a window until the fit says otherwise.
-      if (blue && bright && region.area > 0.02 * surest->area)
+      if (!blue || !bright) continue;
+      if (region.area > kSureShare * surest->area)
         for (const int f : region.facets) out_.sky[f] = 1;
+      else
+        out_.apart.push_back(region.facets);
     }
   }
 

@@ -10,6 +10,7 @@ namespace {
 constexpr double kElsewhere = 1 / (3.9 * 1.4 * 1.4);
 /// A pixel is not a facet's mean: noise, thin cloud and blur are added to the model's deviation.
 constexpr double kPixelSigma = 0.02;
+constexpr int kReach = 8;  ///< facets that a correction is carried
 
 class PixelMasking {
  public:
@@ -17,6 +18,7 @@ class PixelMasking {
       : picture_(picture), fit_(fit), width_(picture.rays.width()), height_(picture.rays.height()) {}
 
   Mask take() {
+    find_corrections();
     likeness_.assign(static_cast<std::size_t>(width_) * height_, 0.0f);
     facet_.assign(likeness_.size(), 0);
     for (int y = 0; y < height_; ++y)
@@ -31,6 +33,35 @@ class PixelMasking {
  private:
   std::size_t at(int x, int y) const { return static_cast<std::size_t>(y) * width_ + x; }
 
+  /// No model fits everywhere: log(seen / model) of the facets of the fit, and beyond them as far as a few
+  /// facets what their neighbours have.
+  void find_corrections() {
+    const FacetSphere& sphere = *fit_.light.sphere;
+    correction_.assign(fit_.used.size(), Eigen::Vector3d::Zero());
+    std::vector<int> ring;
+    std::vector<std::uint8_t> known = fit_.used;
+    for (int f = 0; f < sphere.count(); ++f) {
+      if (!known[f]) continue;
+      ring.push_back(f);
+      const Eigen::Vector3d model = fit_.sky.radiance_in_sky(sphere.centre(f));
+      correction_[f] = (fit_.light.facets[f].mean.array() / model.array()).log().matrix();
+    }
+    for (int step = 0; step < kReach && !ring.empty(); ++step) {
+      std::vector<int> next;
+      for (const int f : ring)
+        for (const int n : sphere.neighbours(f))
+          if (!known[n]) known[n] = 2, next.push_back(n);
+      for (const int f : next) {
+        int count = 0;
+        for (const int n : sphere.neighbours(f))
+          if (known[n] == 1) correction_[f] += correction_[n], ++count;
+        correction_[f] /= std::max(1, count);
+      }
+      for (const int f : next) known[f] = 1;
+      ring = std::move(next);
+    }
+  }
+
   /// Posterior of sky by colour alone.
   void look(int x, int y) {
     if (!picture_.valid.empty() && picture_.valid.at(x, y) != 255) return;
@@ -43,7 +74,8 @@ class PixelMasking {
       likeness_[at(x, y)] = 1;
       return;
     }
-    const Eigen::Vector3d model = fit_.sky.radiance_in_sky(direction);
+    const Eigen::Vector3d model =
+        (fit_.sky.radiance_in_sky(direction).array() * correction_[last_facet_].array().exp()).matrix();
     double exponent = 0, density = 1;
     for (int c = 0; c < 3; ++c) {
       const double sigma = std::hypot(fit_.sky.relative_sigma[c], kPixelSigma);
@@ -87,6 +119,7 @@ class PixelMasking {
   const SkyPicture& picture_;
   const SkyFit& fit_;
   int width_, height_, last_facet_ = 0;
+  std::vector<Eigen::Vector3d> correction_;
   std::vector<float> likeness_;
   std::vector<int> facet_;
   std::vector<std::uint8_t> reached_;
