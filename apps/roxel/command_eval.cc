@@ -235,8 +235,10 @@ int run_eval_sky(const Invocation& invocation, const EvalOptions& options, Sessi
   measures.truth = truth.string();
   measures.skies = measure_skies(run, truth, session.context().thread_count());
   if (measures.skies.empty())
-    throw_invalid((truth / "illumination.json").string(), "no node of the run", "nodes named as in " + run.string());
-  const std::string json = json_text({{"run", measures.run}, {"truth", truth.string()}, {"skies", to_json(measures.skies)}});
+    throw_invalid((truth / "illumination.json").string(), "no node of the run",
+                  "nodes named as in " + run.string());
+  const std::string json =
+      json_text({{"run", measures.run}, {"truth", truth.string()}, {"skies", to_json(measures.skies)}});
   if (!invocation.output.empty()) {
     protect_sources(invocation.output, {{run, truth}});
     const OutputFolder folder(invocation.output);

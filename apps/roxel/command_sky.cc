@@ -106,7 +106,8 @@ ordered_json node_json(const SkyFit& fit, double mask_share) {
 std::string node_line(const SkyFit& fit) {
   const NodeSky& s = fit.sky;
   std::string line = formatted("  %-6s %-9s", s.name.c_str(), to_string(s.model));
-  if (s.has_light()) line += formatted(" error %4.1f %% over %4.1f %% of the dome", 100 * s.mean_error, 100 * s.sky_share);
+  if (s.has_light())
+    line += formatted(" error %4.1f %% over %4.1f %% of the dome", 100 * s.mean_error, 100 * s.sky_share);
   if (const auto sun = used_sun(s)) {
     const ordered_json angles = sun_json(sun);
     line += formatted("; sun %.1f, %.1f (%s), light %s", angles[0].get<double>(), angles[1].get<double>(),
@@ -120,7 +121,8 @@ void write_pictures(const fs::path& run, const SkyFit& fit) {
   const std::vector<SkyPanel> panels = sky_panels(fit);
   std::vector<std::vector<Image>> sheet;
   for (std::size_t i = 0; i < panels.size(); ++i) {
-    write_png(sky_path(run, fit.sky.name, "_" + panels[i].name + ".png").string(), panels[i].picture, kAsItIs);
+    write_png(sky_path(run, fit.sky.name, "_" + panels[i].name + ".png").string(), panels[i].picture,
+              kAsItIs);
     if (i % 2 == 0) sheet.emplace_back();
     sheet.back().push_back(panels[i].picture);
   }
@@ -156,15 +158,16 @@ std::vector<NodeReport> do_nodes(const SkyInput& input, const SkyCommandOptions&
   std::vector<NodeReport> reports(input.tasks.size());
   std::mutex mutex;
   std::size_t done = 0;
-  parallel_for(static_cast<std::int64_t>(reports.size()), session.context().thread_count(), [&](std::int64_t n, int) {
-    session.context().throw_if_cancelled();
-    reports[n] = do_node(input.tasks[n], input.pictures[n], options, run);
-    const std::lock_guard<std::mutex> lock(mutex);
-    Progress progress;
-    progress.stage = "sky";
-    progress.fraction = static_cast<double>(++done) / static_cast<double>(reports.size());
-    session.context().report(progress);
-  });
+  parallel_for(static_cast<std::int64_t>(reports.size()), session.context().thread_count(),
+               [&](std::int64_t n, int) {
+                 session.context().throw_if_cancelled();
+                 reports[n] = do_node(input.tasks[n], input.pictures[n], options, run);
+                 const std::lock_guard<std::mutex> lock(mutex);
+                 Progress progress;
+                 progress.stage = "sky";
+                 progress.fraction = static_cast<double>(++done) / static_cast<double>(reports.size());
+                 session.context().report(progress);
+               });
   return reports;
 }
 
@@ -177,16 +180,18 @@ ordered_json summary_json(const Invocation& invocation, const SkyInput& input, c
     skies.push_back(report.json);
     for (const std::string& warning : report.warnings) warnings.push_back(warning);
   }
-  return {{"format", kSummaryFormat},
-          {"version", ROXEL_VERSION},
-          {"command", invocation.line},
-          {"dataset", {{"path", input.path}, {"format", input.format}, {"images", images}, {"nodes", input.tasks.size()}}},
-          {"options", options},
-          {"termination", "done"},
-          {"seconds", seconds},
-          {"skies", skies},
-          {"notes", input.notes},
-          {"warnings", warnings}};
+  return {
+      {"format", kSummaryFormat},
+      {"version", ROXEL_VERSION},
+      {"command", invocation.line},
+      {"dataset",
+       {{"path", input.path}, {"format", input.format}, {"images", images}, {"nodes", input.tasks.size()}}},
+      {"options", options},
+      {"termination", "done"},
+      {"seconds", seconds},
+      {"skies", skies},
+      {"notes", input.notes},
+      {"warnings", warnings}};
 }
 
 /// A folder of this command's results may be written anew, one of a reconstruction may not.
@@ -236,7 +241,8 @@ int run_sky(const Invocation& invocation, const SkyCommandOptions& options) {
 void add_sky(Commands& commands) {
   CommandForm form{"sky", "Find the daylight of each node: sky, sun and sky masks", "DATASET", "RUN"};
   form.details =
-      "DATASET may also be one panorama of all directions (EXR, HDR, ...). Writes RUN/sky/NODE.json and .exr,\n"
+      "DATASET may also be one panorama of all directions (EXR, HDR, ...). Writes RUN/sky/NODE.json and "
+      ".exr,\n"
       "RUN/sky/mask/NAME.png, pictures, and RUN/summary.json.\n";
   add_command(commands, form, sky_table(), run_sky);
 }

@@ -64,10 +64,10 @@ void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSou
 std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& source) {
   if (paths.truth) {
     if (!has_truth(*paths.truth))
-      throw_invalid(
-          "--truth " + *paths.truth,
-          "no folder depth or albedo, no mesh.ply, transforms_test.json or illumination.json in it",
-          "depth/NAME.exr or albedo/NAME.exr for the images of the run, mesh.ply, held-out views, or the light of nodes");
+      throw_invalid("--truth " + *paths.truth,
+                    "no folder depth or albedo, no mesh.ply, transforms_test.json or illumination.json in it",
+                    "depth/NAME.exr or albedo/NAME.exr for the images of the run, mesh.ply, held-out views, "
+                    "or the light of nodes");
     return *paths.truth;
   }
   const fs::path dataset = paths.dataset.value_or(source.run.file.info.dataset);

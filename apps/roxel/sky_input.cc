@@ -27,7 +27,8 @@ bool is_picture(const fs::path& path) {
 std::optional<fs::path> hand_mask(const std::optional<std::string>& folder, const std::string& name) {
   if (!folder) return std::nullopt;
   for (const std::string& candidate : {name, fs::path(name).filename().string()})
-    if (const fs::path file = fs::path(*folder) / (candidate + ".png"); fs::is_regular_file(file)) return file;
+    if (const fs::path file = fs::path(*folder) / (candidate + ".png"); fs::is_regular_file(file))
+      return file;
   return std::nullopt;
 }
 
@@ -36,8 +37,9 @@ Mask read_hand_mask(const std::optional<std::string>& folder, const std::string&
   if (!file) return {};
   Mask mask = read_mask(file->string());
   if (mask.width() != picture.width() || mask.height() != picture.height())
-    throw_invalid(file->string(), std::to_string(mask.width()) + " x " + std::to_string(mask.height()) + " pixels",
-                  std::to_string(picture.width()) + " x " + std::to_string(picture.height()) + " as its image has");
+    throw_invalid(
+        file->string(), std::to_string(mask.width()) + " x " + std::to_string(mask.height()) + " pixels",
+        std::to_string(picture.width()) + " x " + std::to_string(picture.height()) + " as its image has");
   return mask;
 }
 
@@ -46,7 +48,8 @@ void check_hand_masks(const SkyOptions& options, const std::vector<SkyTask>& tas
   for (const SkyTask& task : tasks)
     for (const std::string& view : task.views)
       if (hand_mask(options.sky_masks, view)) return;
-  throw_invalid("--sky-masks " + *options.sky_masks, "no mask of any image", "NAME.png as images are named, 255 = sky");
+  throw_invalid("--sky-masks " + *options.sky_masks, "no mask of any image",
+                "NAME.png as images are named, 255 = sky");
 }
 
 SkyInput read_panorama(const std::string& path, const InputOptions& input, const SkyOptions& options) {
@@ -54,7 +57,8 @@ SkyInput read_panorama(const std::string& path, const InputOptions& input, const
   if (input.response != "auto") response = parse_response(input.response, "--response");
   ImageFile file = read_image(path, response);
   if (file.rgb.width() != 2 * file.rgb.height())
-    throw_invalid(path, std::to_string(file.rgb.width()) + " x " + std::to_string(file.rgb.height()) + " pixels",
+    throw_invalid(path,
+                  std::to_string(file.rgb.width()) + " x " + std::to_string(file.rgb.height()) + " pixels",
                   "a panorama of all directions, twice as wide as high (or a data set)");
   SkyInput sky;
   sky.path = path;
@@ -102,7 +106,8 @@ SkyInput read_sky_input(const std::string& path, const InputOptions& input, cons
                         const Session& session) {
   if (options.sky_masks && !fs::is_directory(*options.sky_masks))
     throw_invalid("--sky-masks " + *options.sky_masks, "no folder", "a folder of masks NAME.png, 255 = sky");
-  SkyInput sky = is_picture(path) ? read_panorama(path, input, options) : read_views(path, input, options, session);
+  SkyInput sky =
+      is_picture(path) ? read_panorama(path, input, options) : read_views(path, input, options, session);
   check_hand_masks(options, sky.tasks);
   return sky;
 }

@@ -26,7 +26,7 @@ double dome_error(const Image& ours, const Image& truth) {
   return weight > 0 ? error / weight : 0;
 }
 
-double oracle_dome_error(const Image& truth, const Eigen::Vector3d& sun) {
+double oracle_dome_error(const Image& truth, const Eigen::Vector3d& sun, PerezFreedom freedom) {
   SphereLightSum sum(FacetSphere::of_level(5));
   sum.add({truth, {}, {}, PixelRays(Equirectangular{truth.width(), truth.height()})});
   const SphereLight light = sum.result();
@@ -39,6 +39,7 @@ double oracle_dome_error(const Image& truth, const Eigen::Vector3d& sun) {
   sky.model = SkyModel::kPerez;
   sky.sun = sun;
   PerezFitOptions options;
+  options.freedom = freedom;
   options.starts = published_starts(sun);
   for (int c = 0; c < 3; ++c) sky.channels[c] = fit_perez(samples, c, sun, options).channel;
   return dome_error(sky_map(sky, Disc::kWithout, truth.width(), truth.height()), truth);

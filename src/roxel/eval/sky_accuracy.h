@@ -5,16 +5,17 @@
 #include <string>
 
 #include "roxel/sky/node_sky.h"
+#include "roxel/sky/perez_fit.h"
 
 namespace roxel {
 
-/// Mean over the dome, by solid angle, and channels of |ours / truth - 1|; where truth is 0 a direction does not
-/// count. Both maps are equirectangular, of one size; rows above the horizon count.
+/// Mean over the dome, by solid angle, and channels of |ours / truth - 1|; where truth is 0 a direction does
+/// not count. Both maps are equirectangular, of one size; rows above the horizon count.
 double dome_error(const Image& ours, const Image& truth);
 
-/// The same model fitted to the true dome itself: what it could do at best. `truth` without the disc; `sun` in
-/// the sky's frame.
-double oracle_dome_error(const Image& truth, const Eigen::Vector3d& sun);
+/// The same model fitted to the true dome itself: what it could do at best. `truth` without the disc; `sun`
+/// in the sky's frame.
+double oracle_dome_error(const Image& truth, const Eigen::Vector3d& sun, PerezFreedom freedom);
 
 /// Pixels by what two masks say; 128 and above is sky.
 struct MaskAgreement {

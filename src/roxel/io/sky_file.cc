@@ -40,8 +40,14 @@ ordered_json optional_value(const std::optional<T>& value) {
 
 ordered_json channel_json(const NodeSky& sky, int c) {
   const PerezChannel& p = sky.channels[c];
-  ordered_json out{{"scale", p.scale},   {"a", p.shape.a}, {"b", p.shape.b}, {"c", p.shape.c},
-                   {"d", p.shape.d},     {"e", p.shape.e}, {"h", p.shape.h}, {"relative_sigma", sky.relative_sigma[c]},
+  ordered_json out{{"scale", p.scale},
+                   {"a", p.shape.a},
+                   {"b", p.shape.b},
+                   {"c", p.shape.c},
+                   {"d", p.shape.d},
+                   {"e", p.shape.e},
+                   {"h", p.shape.h},
+                   {"relative_sigma", sky.relative_sigma[c]},
                    {"residual", sky.residual[c]}};
   return out;
 }
@@ -104,7 +110,8 @@ class Fields {
   int whole(const char* key, int low, int high) const {
     const double value = number(key);
     if (value != std::floor(value) || value < low || value > high)
-      throw_invalid(where(key), at(key).dump(), "a whole number from " + std::to_string(low) + " to " + std::to_string(high));
+      throw_invalid(where(key), at(key).dump(),
+                    "a whole number from " + std::to_string(low) + " to " + std::to_string(high));
     return static_cast<int>(value);
   }
   std::optional<double> optional_number(const char* key) const {
@@ -158,7 +165,8 @@ void read_channel(const Fields& fields, NodeSky& sky, int c) {
        fields.number("scale")};
   sky.relative_sigma[c] = fields.number("relative_sigma");
   const int order = sky.residual_order;
-  sky.residual[c] = fields.numbers("residual", order ? static_cast<std::size_t>((order + 1) * (order + 1)) : 0);
+  sky.residual[c] =
+      fields.numbers("residual", order ? static_cast<std::size_t>((order + 1) * (order + 1)) : 0);
 }
 
 std::optional<Eigen::Vector3d> read_angles(const Fields& fields, const char* key) {
@@ -190,7 +198,8 @@ void read_rotation(const Fields& fields, NodeSky& sky) {
 
 NodeSky from_json(const json& root, const std::string& file) {
   const Fields fields(root, file);
-  if (fields.text("format") != kFormat) throw_invalid(fields.where("format"), root["format"].dump(), "\"roxel sky\"");
+  if (fields.text("format") != kFormat)
+    throw_invalid(fields.where("format"), root["format"].dump(), "\"roxel sky\"");
   fields.whole("version", kVersion, kVersion);
   NodeSky sky;
   sky.name = fields.text("node");
@@ -233,7 +242,8 @@ fs::path sky_mask_path(const fs::path& run, const std::string& view_name) {
 void write_sky(const fs::path& run, const NodeSky& sky) {
   write_exr(sky_path(run, sky.name, ".exr").string(), rgb_channels(sky_map(sky, Disc::kWith)));
   write_exr(sky_path(run, sky.name, "_nosun.exr").string(), rgb_channels(sky_map(sky, Disc::kWithout)));
-  write_text_atomically(sky_path(run, sky.name), to_json(sky).dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+  write_text_atomically(sky_path(run, sky.name),
+                        to_json(sky).dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 NodeSky read_sky(const fs::path& json_file) {
@@ -256,8 +266,8 @@ std::vector<NodeSky> read_skies(const fs::path& run) {
     skies.push_back(read_sky(file));
     for (std::size_t i = 0; i + 1 < skies.size(); ++i)
       if (skies[i].name == skies.back().name)
-        throw_invalid(file.string() + ": node", "\"" + skies.back().name + "\" as another file of the folder has",
-                      "one file a node");
+        throw_invalid(file.string() + ": node",
+                      "\"" + skies.back().name + "\" as another file of the folder has", "one file a node");
   }
   return skies;
 }

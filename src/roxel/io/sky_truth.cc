@@ -54,7 +54,8 @@ SkyTruth read_node(const json& node, const fs::path& folder, const std::string& 
 Image SkyTruth::map() const {
   const Image image = read_image(map_file.string(), Response{ResponseCurve::kLinear}).rgb;
   if (image.width() != 2 * image.height())
-    throw_invalid(map_file.string(), std::to_string(image.width()) + " x " + std::to_string(image.height()) + " pixels",
+    throw_invalid(map_file.string(),
+                  std::to_string(image.width()) + " x " + std::to_string(image.height()) + " pixels",
                   "a map twice as wide as high");
   return image;
 }
@@ -67,10 +68,12 @@ std::vector<SkyTruth> read_sky_truth(const fs::path& folder) {
   if (!in) throw_invalid(file.string(), "no file that can be read", "the light of each node");
   const json root = json::parse(in, nullptr, false);
   if (!root.is_object() || !root.contains("nodes") || !root["nodes"].is_array())
-    throw_invalid(file.string(), root.is_discarded() ? "no JSON" : "no list \"nodes\"", "the light of each node");
+    throw_invalid(file.string(), root.is_discarded() ? "no JSON" : "no list \"nodes\"",
+                  "the light of each node");
   std::vector<SkyTruth> truths;
   for (std::size_t i = 0; i < root["nodes"].size(); ++i)
-    truths.push_back(read_node(root["nodes"][i], folder, file.string() + ": nodes[" + std::to_string(i) + "]"));
+    truths.push_back(
+        read_node(root["nodes"][i], folder, file.string() + ": nodes[" + std::to_string(i) + "]"));
   return truths;
 }
 

@@ -11,13 +11,13 @@
 namespace roxel {
 
 struct SkyTruth {
-  std::string node;                  ///< as roxel sky names it: "n03"
-  std::filesystem::path map_file;    ///< equirectangular radiance without the disc
-  Eigen::Vector3d sun;               ///< unit, X east, Y north, Z up
-  bool disc = false;                 ///< the sun shines
-  Eigen::Vector3d sun_irradiance;    ///< on a surface that faces the sun
-  Eigen::Vector3d horizontal;        ///< irradiance on the horizontal, with the disc
-  Eigen::Vector3d horizontal_sky;    ///< and without
+  std::string node;                ///< as roxel sky names it: "n03"
+  std::filesystem::path map_file;  ///< equirectangular radiance without the disc
+  Eigen::Vector3d sun;             ///< unit, X east, Y north, Z up
+  bool disc = false;               ///< the sun shines
+  Eigen::Vector3d sun_irradiance;  ///< on a surface that faces the sun
+  Eigen::Vector3d horizontal;      ///< irradiance on the horizontal, with the disc
+  Eigen::Vector3d horizontal_sky;  ///< and without
 
   /// Throws InvalidInput.
   Image map() const;

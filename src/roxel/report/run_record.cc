@@ -13,7 +13,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-
 const char* background_name(BackgroundKind kind) {
   switch (kind) {
     case BackgroundKind::kNone:

@@ -33,15 +33,25 @@ void measure_masks(const fs::path& run, const fs::path& truth, const NodeSky& sk
     if (!file || !fs::is_regular_file(ours)) continue;
     const Mask mask = read_mask(ours.string()), surface = read_mask(file->string());
     if (mask.width() != surface.width() || mask.height() != surface.height())
-      throw_invalid(file->string(), std::to_string(surface.width()) + " x " + std::to_string(surface.height()) + " pixels",
-                    std::to_string(mask.width()) + " x " + std::to_string(mask.height()) + " as " + ours.string() + " has");
+      throw_invalid(file->string(),
+                    std::to_string(surface.width()) + " x " + std::to_string(surface.height()) + " pixels",
+                    std::to_string(mask.width()) + " x " + std::to_string(mask.height()) + " as " +
+                        ours.string() + " has");
     agreement.add(mask, surface);
     ++measure.masks;
   }
   if (measure.masks > 0) measure.mask_iou = agreement.iou();
 }
 
-SkyMeasure measure_sky(const fs::path& run, const fs::path& folder, const NodeSky& sky, const SkyTruth& truth) {
+/// Whether the exponent was free, for an oracle of the same model.
+PerezFreedom freedom_of(const NodeSky& sky) {
+  const bool exponent = std::any_of(sky.channels.begin(), sky.channels.end(),
+                                    [](const PerezChannel& channel) { return channel.shape.h != 1; });
+  return exponent ? PerezFreedom::kExponent : PerezFreedom::kFull;
+}
+
+SkyMeasure measure_sky(const fs::path& run, const fs::path& folder, const NodeSky& sky,
+                       const SkyTruth& truth) {
   SkyMeasure m;
   m.node = sky.name;
   m.model = to_string(sky.model);
@@ -53,7 +63,7 @@ SkyMeasure measure_sky(const fs::path& run, const fs::path& folder, const NodeSk
   if (!sky.has_light()) return m;
   const Image map = truth.map();
   m.dome_error = dome_error(sky_map(sky, Disc::kWithout, map.width(), map.height()), map);
-  m.oracle_error = oracle_dome_error(map, truth.sun);
+  m.oracle_error = oracle_dome_error(map, truth.sun, freedom_of(sky));
   const SkyLight light(sky);
   m.horizontal_error = relative_error(light.horizontal_irradiance(Disc::kWith), truth.horizontal);
   m.horizontal_sky_error = relative_error(light.horizontal_irradiance(Disc::kWithout), truth.horizontal_sky);
@@ -65,7 +75,9 @@ ordered_json optional_json(const std::optional<T>& value) {
   return value ? ordered_json(*value) : ordered_json(nullptr);
 }
 
-std::string percent(const std::optional<double>& share) { return share ? formatted("%.2f", 100 * *share) : "-"; }
+std::string percent(const std::optional<double>& share) {
+  return share ? formatted("%.2f", 100 * *share) : "-";
+}
 std::string number(const std::optional<double>& value, int digits) {
   return value ? formatted("%.*f", digits, *value) : "-";
 }
@@ -105,25 +117,29 @@ ordered_json to_json(const std::vector<SkyMeasure>& skies) {
 
 std::string csv_table(const std::vector<SkyMeasure>& skies) {
   std::string out =
-      "node,model,fit_error,dome_error,oracle_error,sun_error_deg,found_sun_error_deg,sun_light,horizontal_error,"
+      "node,model,fit_error,dome_error,oracle_error,sun_error_deg,found_sun_error_deg,sun_light,horizontal_"
+      "error,"
       "horizontal_sky_error,mask_iou,masks\n";
   for (const SkyMeasure& m : skies)
-    out += formatted("%s,%s,%.6g,%s,%s,%s,%s,%s,%.6g,%.6g,%s,%d\n", m.node.c_str(), m.model.c_str(), m.fit_error,
-                     number(m.dome_error, 6).c_str(), number(m.oracle_error, 6).c_str(),
-                     number(m.sun_error_deg, 4).c_str(), number(m.found_error_deg, 4).c_str(), m.sun_light.c_str(),
-                     m.horizontal_error, m.horizontal_sky_error, number(m.mask_iou, 5).c_str(), m.masks);
+    out += formatted("%s,%s,%.6g,%s,%s,%s,%s,%s,%.6g,%.6g,%s,%d\n", m.node.c_str(), m.model.c_str(),
+                     m.fit_error, number(m.dome_error, 6).c_str(), number(m.oracle_error, 6).c_str(),
+                     number(m.sun_error_deg, 4).c_str(), number(m.found_error_deg, 4).c_str(),
+                     m.sun_light.c_str(), m.horizontal_error, m.horizontal_sky_error,
+                     number(m.mask_iou, 5).c_str(), m.masks);
   return out;
 }
 
 std::string to_text(const std::vector<SkyMeasure>& skies) {
   if (skies.empty()) return "";
   std::string out =
-      "sky      fit %  dome %  oracle %  sun deg  found deg  light with sun %  sky alone %  sun's light  mask IoU\n";
+      "sky      fit %  dome %  oracle %  sun deg  found deg  light with sun %  sky alone %  sun's light  "
+      "mask IoU\n";
   for (const SkyMeasure& m : skies)
-    out += formatted("  %-6s %5.2f  %6s  %8s  %7s  %9s  %16.2f  %11.2f  %-11s  %8s\n", m.node.c_str(), 100 * m.fit_error,
-                     percent(m.dome_error).c_str(), percent(m.oracle_error).c_str(), number(m.sun_error_deg, 2).c_str(),
-                     number(m.found_error_deg, 2).c_str(), 100 * m.horizontal_error, 100 * m.horizontal_sky_error,
-                     m.sun_light.c_str(), number(m.mask_iou, 4).c_str());
+    out += formatted("  %-6s %5.2f  %6s  %8s  %7s  %9s  %16.2f  %11.2f  %-11s  %8s\n", m.node.c_str(),
+                     100 * m.fit_error, percent(m.dome_error).c_str(), percent(m.oracle_error).c_str(),
+                     number(m.sun_error_deg, 2).c_str(), number(m.found_error_deg, 2).c_str(),
+                     100 * m.horizontal_error, 100 * m.horizontal_sky_error, m.sun_light.c_str(),
+                     number(m.mask_iou, 4).c_str());
   return out;
 }
 

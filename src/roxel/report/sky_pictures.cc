@@ -62,13 +62,14 @@ class Panels {
 
   std::vector<SkyPanel> take() {
     const SkyMasks& m = fit_.masks;
-    return {{"seen", "as the images show it", picture([&](int f, const auto&) { return seen(f); })},
-            masked("variance", "too much contrast", m.variance, {1, 0.1f, 0.1f}),
-            masked("red_blue", m.red_blue_used ? "not blue" : "not blue (left out)", m.red_blue, {1, 0.9f, 0.1f}),
-            masked("luminance", m.luminance_used ? "dark" : "dark (left out)", m.luminance, {0.1f, 0.9f, 0.2f}),
-            masked("used", "facets of the fit", fit_.used, {0.1f, 0.4f, 1}),
-            {"fit", "fitted sky", picture([&](int, const auto& d) { return fitted(d); })},
-            {"error", "error of the fit", picture([&](int f, const auto&) { return error(f); })}};
+    return {
+        {"seen", "as the images show it", picture([&](int f, const auto&) { return seen(f); })},
+        masked("variance", "too much contrast", m.variance, {1, 0.1f, 0.1f}),
+        masked("red_blue", m.red_blue_used ? "not blue" : "not blue (left out)", m.red_blue, {1, 0.9f, 0.1f}),
+        masked("luminance", m.luminance_used ? "dark" : "dark (left out)", m.luminance, {0.1f, 0.9f, 0.2f}),
+        masked("used", "facets of the fit", fit_.used, {0.1f, 0.4f, 1}),
+        {"fit", "fitted sky", picture([&](int, const auto& d) { return fitted(d); })},
+        {"error", "error of the fit", picture([&](int f, const auto&) { return error(f); })}};
   }
 
  private:

@@ -1,6 +1,7 @@
 #pragma once
 /// Pictures of how a sky was found: the sphere as the images show it, each mask, the fitted sky, its error.
-/// All directions from the zenith down to 30 degrees below the horizon; north in the middle, east to the right.
+/// All directions from the zenith down to 30 degrees below the horizon; north in the middle, east to the
+/// right.
 
 #include <string>
 #include <vector>

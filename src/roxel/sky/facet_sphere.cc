@@ -12,22 +12,29 @@ using Triangle = std::array<Eigen::Vector3d, 3>;
 
 /// Bits of the octant: 1 = x < 0, 2 = y < 0, 4 = z < 0; corners turn the same way in all.
 Triangle octant_corners(int octant) {
-  const Eigen::Vector3d x(octant & 1 ? -1 : 1, 0, 0), y(0, octant & 2 ? -1 : 1, 0), z(0, 0, octant & 4 ? -1 : 1);
+  const Eigen::Vector3d x(octant & 1 ? -1 : 1, 0, 0), y(0, octant & 2 ? -1 : 1, 0),
+      z(0, 0, octant & 4 ? -1 : 1);
   const bool mirrored = ((octant & 1) + (octant >> 1 & 1) + (octant >> 2 & 1)) % 2 == 1;
   return mirrored ? Triangle{x, z, y} : Triangle{x, y, z};
 }
 
-int octant_of(const Eigen::Vector3d& d) { return (d.x() < 0 ? 1 : 0) | (d.y() < 0 ? 2 : 0) | (d.z() < 0 ? 4 : 0); }
+int octant_of(const Eigen::Vector3d& d) {
+  return (d.x() < 0 ? 1 : 0) | (d.y() < 0 ? 2 : 0) | (d.z() < 0 ? 4 : 0);
+}
 
 /// Child 0 to 2 keeps that corner, child 3 is the middle.
 Triangle child_of(const Triangle& t, int child) {
   const Eigen::Vector3d ab = (t[0] + t[1]).normalized(), bc = (t[1] + t[2]).normalized(),
                         ca = (t[2] + t[0]).normalized();
   switch (child) {
-    case 0: return {t[0], ab, ca};
-    case 1: return {ab, t[1], bc};
-    case 2: return {ca, bc, t[2]};
-    default: return {ab, bc, ca};
+    case 0:
+      return {t[0], ab, ca};
+    case 1:
+      return {ab, t[1], bc};
+    case 2:
+      return {ca, bc, t[2]};
+    default:
+      return {ab, bc, ca};
   }
 }
 
@@ -57,7 +64,8 @@ void FacetSphere::divide(int level, const Triangle& corners) {
     for (int child = 0; child < 4; ++child) divide(level - 1, child_of(corners, child));
     return;
   }
-  Facet facet{corners, {}, (corners[0] + corners[1] + corners[2]).normalized(), spherical_triangle_area(corners), {}};
+  Facet facet{
+      corners, {}, (corners[0] + corners[1] + corners[2]).normalized(), spherical_triangle_area(corners), {}};
   for (int edge = 0; edge < 3; ++edge) facet.normals[edge] = corners[edge].cross(corners[(edge + 1) % 3]);
   facets_.push_back(facet);
 }

@@ -31,30 +31,42 @@ double factorial(int n) { return n < 2 ? 1 : n * factorial(n - 1); }
 
 const char* to_string(SkyModel model) {
   switch (model) {
-    case SkyModel::kNone: return "none";
-    case SkyModel::kUniform: return "uniform";
-    case SkyModel::kPublished: return "published";
-    case SkyModel::kGradation: return "gradation";
-    case SkyModel::kPerez: return "perez";
+    case SkyModel::kNone:
+      return "none";
+    case SkyModel::kUniform:
+      return "uniform";
+    case SkyModel::kPublished:
+      return "published";
+    case SkyModel::kGradation:
+      return "gradation";
+    case SkyModel::kPerez:
+      return "perez";
   }
   return "?";
 }
 
 const char* to_string(SunSource source) {
   switch (source) {
-    case SunSource::kNone: return "none";
-    case SunSource::kTime: return "time";
-    case SunSource::kImages: return "images";
-    case SunSource::kGiven: return "given";
+    case SunSource::kNone:
+      return "none";
+    case SunSource::kTime:
+      return "time";
+    case SunSource::kImages:
+      return "images";
+    case SunSource::kGiven:
+      return "given";
   }
   return "?";
 }
 
 const char* to_string(SunLight light) {
   switch (light) {
-    case SunLight::kNone: return "none";
-    case SunLight::kMeasured: return "measured";
-    case SunLight::kEstimated: return "estimated";
+    case SunLight::kNone:
+      return "none";
+    case SunLight::kMeasured:
+      return "measured";
+    case SunLight::kEstimated:
+      return "estimated";
   }
   return "?";
 }
@@ -68,7 +80,8 @@ std::vector<double> spherical_functions(int order, const Eigen::Vector3d& d) {
     for (int m = -l; m <= l; ++m) {
       const int k = std::abs(m);
       const double norm = std::sqrt((2 * l + 1) / (4 * kPi) * factorial(l - k) / factorial(l + k));
-      const double turn = m == 0 ? 1 : std::numbers::sqrt2 * (m > 0 ? std::cos(k * azimuth) : std::sin(k * azimuth));
+      const double turn =
+          m == 0 ? 1 : std::numbers::sqrt2 * (m > 0 ? std::cos(k * azimuth) : std::sin(k * azimuth));
       values.push_back(norm * turn * legendre(l, k, d.z()));
     }
   return values;
@@ -113,7 +126,8 @@ SkyLight::SkyLight(const NodeSky& sky)
 
 Eigen::Vector3d SkyLight::irradiance(const Eigen::Vector3d& normal, Disc disc) const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < light_.size(); ++i) sum += std::max(0.0, directions_[i].dot(normal)) * light_[i];
+  for (std::size_t i = 0; i < light_.size(); ++i)
+    sum += std::max(0.0, directions_[i].dot(normal)) * light_[i];
   if (disc == Disc::kWith && sun_.dot(up_) > 0) sum += std::max(0.0, sun_.dot(normal)) * sun_irradiance_;
   return sum;
 }

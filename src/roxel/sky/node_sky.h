@@ -54,16 +54,16 @@ struct NodeSky {
   int clearness_bin = 0;                                     ///< nearest published sky, 0 overcast to 7 clear
 
   SunSource sun_source = SunSource::kNone;
-  Eigen::Vector3d sun = Eigen::Vector3d::UnitZ();   ///< unit, sky frame; the zenith where it is not known
-  std::optional<Eigen::Vector3d> sun_by_time;       ///< sky frame
-  std::optional<Eigen::Vector3d> sun_by_images;     ///< sky frame
+  Eigen::Vector3d sun = Eigen::Vector3d::UnitZ();  ///< unit, sky frame; the zenith where it is not known
+  std::optional<Eigen::Vector3d> sun_by_time;      ///< sky frame
+  std::optional<Eigen::Vector3d> sun_by_images;    ///< sky frame
   SunLight sun_light = SunLight::kNone;
   Eigen::Vector3d sun_irradiance = Eigen::Vector3d::Zero();  ///< on a surface that faces the sun
 
-  double mean_error = 0;          ///< mean of |model / seen - 1| over the facets used and channels
-  double sky_share = 0;           ///< of the upper hemisphere: facets used
-  double seen_share = 0;          ///< of the upper hemisphere: facets in view
-  double mean_disagreement = 0;   ///< between pictures, of the luminance of facets used that several see
+  double mean_error = 0;         ///< mean of |model / seen - 1| over the facets used and channels
+  double sky_share = 0;          ///< of the upper hemisphere: facets used
+  double seen_share = 0;         ///< of the upper hemisphere: facets in view
+  double mean_disagreement = 0;  ///< between pictures, of the luminance of facets used that several see
 
   bool has_light() const { return model != SkyModel::kNone; }
   /// Unit, world.
@@ -99,8 +99,8 @@ class SkyLight {
   Eigen::Vector3d up_, sun_, sun_irradiance_;
 };
 
-/// Radiance in all directions of the sky's frame as an equirectangular map (sky_picture.h); 0 below the horizon.
-/// The disc's light is spread over the pixels that it covers, half a degree at least.
+/// Radiance in all directions of the sky's frame as an equirectangular map (sky_picture.h); 0 below the
+/// horizon. The disc's light is spread over the pixels that it covers, half a degree at least.
 Image sky_map(const NodeSky& sky, Disc disc, int width = 512, int height = 256);
 
 /// Real spherical functions up to an order, (order + 1)^2 values, orthonormal on the sphere; order 0 to 4.

@@ -14,11 +14,11 @@
 namespace roxel {
 
 struct PerezShape {
-  double a = 0;  ///< gradation from zenith to horizon: below 0 the horizon is darker, above 0 brighter
+  double a = 0;   ///< gradation from zenith to horizon: below 0 the horizon is darker, above 0 brighter
   double b = -1;  ///< its width, b <= 0
-  double c = 0;  ///< brightness around the sun
+  double c = 0;   ///< brightness around the sun
   double d = -1;  ///< its width, d <= 0
-  double e = 0;  ///< light scattered back, opposite to the sun
+  double e = 0;   ///< light scattered back, opposite to the sun
   double h = 1;
 
   bool operator==(const PerezShape&) const = default;

@@ -27,20 +27,27 @@ struct RelativeError {
   template <class T>
   bool operator()(const T* p, T* residual) const {
     using std::exp;
-    residual[0] = root_weight * (exp(p[0]) * perez_relative(p + 1, seen.cos_theta, seen.phi) / seen.radiance - 1.0);
+    residual[0] =
+        root_weight * (exp(p[0]) * perez_relative(p + 1, seen.cos_theta, seen.phi) / seen.radiance - 1.0);
     return true;
   }
 };
 
-/// (p - prior) / usual spread, of a to h.
+/// What skies are like where no sample says it, that is near the horizon. Clear: 1 - exp(b / cos theta), a =
+/// -1, is sunlight scattered once in air of optical depth -b; more of it is lost again in thicker air, and
+/// skies computed from first principles have a = -1.01 - 0.25 b^2 within 0.02. Overcast: as CIE's [CIE03].
 struct PriorError {
-  Parameters prior;
+  bool clear;  ///< darker at the zenith than at the horizon, but for the sun
   double strength;
 
   template <class T>
   bool operator()(const T* p, T* residual) const {
-    constexpr double kSpread[6] = {1, 0.3, 5, 2, 0.5, 0.3};
-    for (int i = 0; i < 6; ++i) residual[i] = std::sqrt(2 * strength) * (p[i + 1] - prior[i + 1]) / kSpread[i];
+    const double root = std::sqrt(2 * strength);
+    residual[0] = root * (clear ? (p[1] + 1.01 + 0.25 * p[2] * p[2]) / 0.01 : (p[1] - 4.0) / 0.6);
+    residual[1] = root * (clear ? (p[2] + 0.3) / 0.3 : (p[2] + 0.7) / 0.06);
+    residual[2] = root * (clear ? (p[3] - 15.0) / 100.0 : p[3] / 0.1);
+    residual[3] = root * (clear ? (p[4] + 5.0) / 20.0 : (p[4] + 1.0) / 1.0);
+    residual[4] = root * (clear ? (p[5] - 1.0) / 5.0 : p[5] / 0.06);
     return true;
   }
 };
@@ -51,7 +58,9 @@ Parameters parameters_of(const PerezShape& s, double scale) {
   return p;
 }
 
-PerezChannel channel_of(const Parameters& p) { return {{p[1], p[2], p[3], p[4], p[5], p[6]}, std::exp(p[0])}; }
+PerezChannel channel_of(const Parameters& p) {
+  return {{p[1], p[2], p[3], p[4], p[5], p[6]}, std::exp(p[0])};
+}
 
 double relative(const PerezShape& s, const Seen& seen) {
   const double abcdeh[6] = {s.a, s.b, s.c, s.d, s.e, s.h};
@@ -80,15 +89,18 @@ double mean_error(const PerezChannel& channel, const std::vector<Seen>& seen) {
 
 std::vector<int> fixed_parameters(PerezFreedom freedom) {
   switch (freedom) {
-    case PerezFreedom::kGradation: return {3, 4, 5, 6};
-    case PerezFreedom::kExponent: return {};
-    default: return {6};
+    case PerezFreedom::kGradation:
+      return {3, 4, 5, 6};
+    case PerezFreedom::kExponent:
+      return {};
+    default:
+      return {6};
   }
 }
 
 /// Runs Ceres from `p`; returns the robust cost per weight.
-double minimise(const std::vector<Seen>& seen, const PerezFitOptions& options, const Parameters& prior,
-                int iterations, Parameters& p) {
+double minimise(const std::vector<Seen>& seen, const PerezFitOptions& options, int iterations,
+                Parameters& p) {
   ceres::Problem problem;
   double total = 0;
   for (const Seen& s : seen) total += s.weight;
@@ -96,11 +108,12 @@ double minimise(const std::vector<Seen>& seen, const PerezFitOptions& options, c
   for (const Seen& s : seen)
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<RelativeError, 1, kParameters>(new RelativeError{s, 1.0}),
-        new ceres::ScaledLoss(new ceres::CauchyLoss(options.loss_scale), s.weight / total, ceres::TAKE_OWNERSHIP),
+        new ceres::ScaledLoss(new ceres::CauchyLoss(options.loss_scale), s.weight / total,
+                              ceres::TAKE_OWNERSHIP),
         p.data());
   if (options.prior_strength > 0)
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorError, 6, kParameters>(
-                                 new PriorError{prior, options.prior_strength}),
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorError, 5, kParameters>(
+                                 new PriorError{p[1] < 0, options.prior_strength}),
                              nullptr, p.data());
   for (int i = 0; i < kParameters; ++i) {
     problem.SetParameterLowerBound(p.data(), i, kLow[i]);
@@ -130,8 +143,8 @@ std::vector<Seen> seen_of(const std::vector<SkySample>& samples, int channel, co
   std::vector<Seen> seen;
   for (const SkySample& s : samples)
     if (s.radiance[channel] > 0 && s.weight > 0)
-      seen.push_back({s.direction.z(), std::acos(std::clamp(s.direction.dot(sun), -1.0, 1.0)), s.radiance[channel],
-                      s.weight});
+      seen.push_back({s.direction.z(), std::acos(std::clamp(s.direction.dot(sun), -1.0, 1.0)),
+                      s.radiance[channel], s.weight});
   return seen;
 }
 
@@ -151,20 +164,19 @@ PerezFit fit_perez(const std::vector<SkySample>& samples, int channel, const Eig
   const std::vector<Seen> few = thinned(all, kStartSamples), many = thinned(all, options.most_samples);
   PerezFit best;
   double best_cost = std::numeric_limits<double>::infinity();
-  Parameters best_parameters{}, best_prior{};
+  Parameters best_parameters{};
   for (std::size_t i = 0; i < options.starts.size(); ++i) {
     const PerezShape shape = start_shape(options.starts[i], options.freedom);
     Parameters p = parameters_of(shape, scale_of(shape, few));
-    const Parameters prior = options.prior ? parameters_of(start_shape(*options.prior, options.freedom), 1) : p;
     const double cost = options.freedom == PerezFreedom::kScaleOnly
                             ? mean_error(channel_of(p), few)
-                            : minimise(few, options, prior, options.iterations / 2, p);
-    if (cost < best_cost || i == 0) best_cost = cost, best_parameters = p, best_prior = prior, best.start = static_cast<int>(i);
+                            : minimise(few, options, options.iterations / 2, p);
+    if (cost < best_cost || i == 0) best_cost = cost, best_parameters = p, best.start = static_cast<int>(i);
   }
   if (options.freedom == PerezFreedom::kScaleOnly)
     best_parameters[0] = std::log(scale_of(channel_of(best_parameters).shape, many));
   else
-    minimise(many, options, best_prior, options.iterations, best_parameters);
+    minimise(many, options, options.iterations, best_parameters);
   best.channel = channel_of(best_parameters);
   best.mean_error = mean_error(best.channel, all);
   return best;
@@ -175,8 +187,8 @@ std::vector<PerezShape> published_starts(const Eigen::Vector3d& sun) {
   std::vector<PerezShape> starts;
   for (int bin = 0; bin < kClearnessBins; ++bin)
     starts.push_back(published_perez(bin, zenith, usual_brightness(bin)));
-  starts.push_back({4, -0.7, 0, -1, 0, 1});      // CIE 1: overcast, three times brighter at the zenith
-  starts.push_back({0, -1, 0, -1, 0, 1});        // CIE 5: uniform
+  starts.push_back({4, -0.7, 0, -1, 0, 1});        // CIE 1: overcast, three times brighter at the zenith
+  starts.push_back({0, -1, 0, -1, 0, 1});          // CIE 5: uniform
   starts.push_back({-1, -0.32, 10, -3, 0.45, 1});  // CIE 12: clear, clean air
   return starts;
 }

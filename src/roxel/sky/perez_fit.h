@@ -2,7 +2,6 @@
 /// Fits the all-weather sky to radiances, one channel at a time.
 
 #include <Eigen/Core>
-#include <optional>
 #include <vector>
 
 #include "roxel/sky/perez.h"
@@ -27,8 +26,7 @@ enum class PerezFreedom {
 struct PerezFitOptions {
   PerezFreedom freedom = PerezFreedom::kFull;
   std::vector<PerezShape> starts;  ///< at least one; see published_starts
-  double prior_strength = 0;       ///< holds the shape near its prior: matters where no sample is
-  std::optional<PerezShape> prior; ///< unset: the start
+  double prior_strength = 0;       ///< holds the shape near what skies are like: matters where no sample is
   double loss_scale = 0.05;        ///< relative errors above it count less and less (Cauchy)
   int iterations = 60;             ///< of the refinement; each start gets half as many on fewer samples
   int most_samples = 4000;         ///< more are thinned out evenly

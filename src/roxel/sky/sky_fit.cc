@@ -13,13 +13,15 @@ namespace {
 
 constexpr double kPi = std::numbers::pi, kDegree = kPi / 180;
 constexpr double kHemisphere = 2 * kPi;
-constexpr double kNightDeg = -6;          ///< civil twilight ends
-constexpr double kLeastShare = 0.0005;    ///< of the hemisphere, for any model
-constexpr double kShareForShape = 0.03;   ///< of the hemisphere, for free parameters
-/// Of log radiance: no model fits better everywhere, and none is good near the horizon.
+constexpr double kNightDeg = -6;         ///< civil twilight ends
+constexpr double kLeastShare = 0.0005;   ///< of the hemisphere, for any model
+constexpr double kShareForShape = 0.03;  ///< of the hemisphere, for free parameters
+/// Of log radiance: no model fits better everywhere, and none is good near the horizon and the sun.
 constexpr double kAgreeSigmas = 3, kAlwaysAgrees = 0.12, kAtHorizon = 0.5, kHorizonDeg = 6;
-constexpr double kPriorStrength = 2e-6;
-/// Regions apart from the sky's (gaps, arches) must be about as bright and of that colour: windows are darker.
+constexpr double kAtSun = 0.5, kSunDeg = 10;
+constexpr double kPriorStrength = 2e-5;  ///< as much as a relative error of 0.7 % at one prior deviation
+/// Regions apart from the sky's (gaps, arches) must be about as bright and of that colour: windows are
+/// darker.
 constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
@@ -37,7 +39,8 @@ double direct_over_diffuse(int bin, double sun_zenith) {
 /// Colour of sunlight through clean air with some haze, luminance 1.
 Eigen::Vector3d sunlight_color(double sine_elevation) {
   const Eigen::Array3d depth(0.118, 0.197, 0.375);  // at 680, 550, 440 nm
-  const double air_mass = 1 / (std::max(0.0, sine_elevation) + 0.025 * std::exp(-11 * std::max(0.0, sine_elevation)));
+  const double air_mass =
+      1 / (std::max(0.0, sine_elevation) + 0.025 * std::exp(-11 * std::max(0.0, sine_elevation)));
   const Eigen::Vector3d color = (-depth * air_mass).exp().matrix();
   return color / luminance(color);
 }
@@ -45,7 +48,10 @@ Eigen::Vector3d sunlight_color(double sine_elevation) {
 class Fitting {
  public:
   Fitting(const SkyTask& task, const SkyPictureSource& pictures, const SkyFitOptions& options)
-      : task_(task), pictures_(pictures), options_(options), sphere_(FacetSphere::of_level(options.facet_level)) {}
+      : task_(task),
+        pictures_(pictures),
+        options_(options),
+        sphere_(FacetSphere::of_level(options.facet_level)) {}
 
   SkyFit take() {
     describe();
@@ -112,9 +118,10 @@ class Fitting {
     }
     const double apart = angle_deg(sky().sun, *sky().sun_by_images);
     if (apart > kSunsDifferDeg)
-      out_.warnings.push_back(formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
-                                        "reflection, or a wrong time, place or north",
-                                        sky().sun_source == SunSource::kGiven ? "by hand" : "by time", apart));
+      out_.warnings.push_back(
+          formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
+                    "reflection, or a wrong time, place or north",
+                    sky().sun_source == SunSource::kGiven ? "by hand" : "by time", apart));
   }
 
   double share_used() const {
@@ -155,13 +162,15 @@ class Fitting {
   std::vector<SkySample> samples() const {
     std::vector<SkySample> samples;
     for (int f = 0; f < sphere_->count(); ++f)
-      if (out_.used[f]) samples.push_back({sphere_->centre(f), out_.light.facets[f].mean, sphere_->solid_angle(f)});
+      if (out_.used[f])
+        samples.push_back({sphere_->centre(f), out_.light.facets[f].mean, sphere_->solid_angle(f)});
     return samples;
   }
 
   void fit() {
     sky().model = decidable();
-    for (out_.rounds = 0; sky().has_light() && out_.rounds < options_.most_rounds && !out_.settled; ++out_.rounds) {
+    for (out_.rounds = 0; sky().has_light() && out_.rounds < options_.most_rounds && !out_.settled;
+         ++out_.rounds) {
       fit_channels();
       const std::vector<std::uint8_t> agreeing = agreeing_facets();
       out_.settled = agreeing == out_.used;
@@ -179,15 +188,14 @@ class Fitting {
     PerezFitOptions fit;
     fit.prior_strength = kPriorStrength;
     fit.freedom = options_.free_exponent ? PerezFreedom::kExponent : PerezFreedom::kFull;
-    if (sky().model == SkyModel::kPublished || sky().model == SkyModel::kUniform) fit.freedom = PerezFreedom::kScaleOnly;
+    if (sky().model == SkyModel::kPublished || sky().model == SkyModel::kUniform)
+      fit.freedom = PerezFreedom::kScaleOnly;
     if (sky().model == SkyModel::kGradation) fit.freedom = PerezFreedom::kGradation;
     for (int c = 0; c < 3; ++c) {
-      fit.starts = sky().model == SkyModel::kUniform ? std::vector<PerezShape>{PerezShape{}} : published_starts(sky().sun);
-      if (out_.rounds > 0) fit.starts = {sky().channels[c].shape}, fit.prior = prior_[c];
-      const std::vector<PerezShape> starts = fit.starts;
-      const PerezFit fitted = fit_perez(seen, c, sky().sun, fit);
-      sky().channels[c] = fitted.channel;
-      if (out_.rounds == 0) prior_[c] = starts[fitted.start];
+      fit.starts = sky().model == SkyModel::kUniform ? std::vector<PerezShape>{PerezShape{}}
+                                                     : published_starts(sky().sun);
+      if (out_.rounds > 0) fit.starts = {sky().channels[c].shape};
+      sky().channels[c] = fit_perez(seen, c, sky().sun, fit).channel;
     }
     fit_residual(seen);
     find_sigma(seen);
@@ -235,7 +243,8 @@ class Fitting {
   bool agrees(int f) const {
     const Eigen::Array3d error = log_ratio(sphere_->centre(f), out_.light.facets[f].mean).array().abs();
     const double elevation = std::asin(sphere_->centre(f).z()) / kDegree;
-    const double always = kAlwaysAgrees + kAtHorizon * std::exp(-elevation / kHorizonDeg);
+    const double always = kAlwaysAgrees + kAtHorizon * std::exp(-elevation / kHorizonDeg) +
+                          kAtSun * std::exp(-angle_deg(sphere_->centre(f), out_.sky.sun) / kSunDeg);
     return (error < (kAgreeSigmas * out_.sky.relative_sigma.array()).max(always)).all();
   }
 
@@ -244,7 +253,8 @@ class Fitting {
     for (const int f : region) sum += log_ratio(sphere_->centre(f), out_.light.facets[f].mean);
     const Eigen::Vector3d mean = sum / static_cast<double>(region.size());
     const double brightness = mean.mean();
-    return std::abs(brightness) < kApartBrightness && (mean.array() - brightness).abs().maxCoeff() < kApartColor;
+    return std::abs(brightness) < kApartBrightness &&
+           (mean.array() - brightness).abs().maxCoeff() < kApartColor;
   }
 
   /// Facets that agree with the model and hang together with those that were used.
@@ -335,7 +345,6 @@ class Fitting {
   const SkyFitOptions& options_;
   std::shared_ptr<const FacetSphere> sphere_;
   std::vector<SunMeasure> measures_;
-  std::array<PerezShape, 3> prior_;
   SkyFit out_;
 };
 

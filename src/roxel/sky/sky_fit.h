@@ -15,11 +15,11 @@
 namespace roxel {
 
 struct SkyFitOptions {
-  int facet_level = 6;          ///< of the sphere, 4 to 8: 1.7 degrees at 6
+  int facet_level = 6;  ///< of the sphere, 4 to 8: 1.7 degrees at 6
   SkyMaskOptions masks;
-  bool free_exponent = false;   ///< fit h, too
-  int residual_order = 0;       ///< of spherical functions on top of the model, 0 (none) to 4
-  int most_rounds = 8;          ///< fits, each with the facets that agree with the one before
+  bool free_exponent = true;       ///< fit h, too; else it is 1
+  int residual_order = 0;          ///< of spherical functions on top of the model, 0 (none) to 4
+  int most_rounds = 8;             ///< fits, each with the facets that agree with the one before
   std::optional<SunPosition> sun;  ///< by hand
 };
 

@@ -11,9 +11,10 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kNearSunDeg = 3, kGlareDeg = 10;
-constexpr double kBorneOut = 0.8;  ///< share of the surest region that must pass a mask for it to be used
+constexpr double kBorneOut = 0.8;   ///< share of the surest region that must pass a mask for it to be used
 constexpr double kSureShare = 0.1;  ///< of the surest region's area: others need not be doubted
-constexpr double kLeastRegion = 0.0015;  ///< steradians: smaller regions are windows and gaps (5 square degrees)
+constexpr double kLeastRegion =
+    0.0015;  ///< steradians: smaller regions are windows and gaps (5 square degrees)
 
 struct Region {
   std::vector<int> facets;
@@ -28,7 +29,8 @@ class Masking {
 
   SkyMasks take() {
     const std::size_t count = light_.facets.size();
-    for (auto* mask : {&out_.unusable, &out_.variance, &out_.red_blue, &out_.luminance, &out_.near_sun, &out_.sky})
+    for (auto* mask :
+         {&out_.unusable, &out_.variance, &out_.red_blue, &out_.luminance, &out_.near_sun, &out_.sky})
       mask->assign(count, 0);
     find_mean();
     for (int f = 0; f < sphere_.count(); ++f) mask_facet(f);
@@ -60,7 +62,8 @@ class Masking {
     const double light = luminance(facet.mean);
     const bool clipped = facet.clipped > 0.1 * (facet.weight + facet.clipped);
     const bool below = sphere_.centre(f).z() <= std::sin(options_.lowest_elevation_deg * kDegree);
-    out_.unusable[f] = below || clipped || facet.coverage < options_.least_coverage || !(facet.mean.minCoeff() > 0);
+    out_.unusable[f] =
+        below || clipped || facet.coverage < options_.least_coverage || !(facet.mean.minCoeff() > 0);
     out_.variance[f] = facet.contrast > options_.contrast_limit;
     out_.red_blue[f] = !(facet.mean[0] < options_.red_blue_limit * facet.mean[2]);
     out_.luminance[f] = !(light >= out_.mean_luminance);
@@ -73,7 +76,8 @@ class Masking {
     if (!(known > 0)) return false;
     for (int f = 0; f < sphere_.count(); ++f) {
       const FacetLight& facet = light_.facets[f];
-      out_.sky[f] = !out_.unusable[f] && !out_.near_sun[f] && facet.known_sky > 0.9 * (facet.weight + facet.clipped);
+      out_.sky[f] =
+          !out_.unusable[f] && !out_.near_sun[f] && facet.known_sky > 0.9 * (facet.weight + facet.clipped);
     }
     out_.reason = "masks by hand say what is sky";
     return true;
@@ -129,7 +133,8 @@ class Masking {
     out_.red_blue_used = out_.red_blue_share >= kBorneOut;
     out_.luminance_used = out_.luminance_share >= kBorneOut;
     out_.reason = formatted(
-        "of the largest smooth region high up, %.0f %% is blue (red over blue %s) and %.0f %% brighter than the mean "
+        "of the largest smooth region high up, %.0f %% is blue (red over blue %s) and %.0f %% brighter than "
+        "the mean "
         "(luminance %s)",
         100 * out_.red_blue_share, out_.red_blue_used ? "used" : "left out", 100 * out_.luminance_share,
         out_.luminance_used ? "used" : "left out");
@@ -156,7 +161,8 @@ class Masking {
 
 }  // namespace
 
-SkyMasks sky_masks(const SphereLight& light, const std::optional<Eigen::Vector3d>& sun, const SkyMaskOptions& options) {
+SkyMasks sky_masks(const SphereLight& light, const std::optional<Eigen::Vector3d>& sun,
+                   const SkyMaskOptions& options) {
   return Masking(light, sun, options).take();
 }
 

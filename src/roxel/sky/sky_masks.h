@@ -25,9 +25,11 @@ struct SkyMasks {
   std::vector<std::uint8_t> variance;   ///< too much contrast within the facet
   std::vector<std::uint8_t> red_blue;   ///< not blue enough
   std::vector<std::uint8_t> luminance;  ///< darker than the mean of what is seen, sun left out
-  std::vector<std::uint8_t> near_sun;   ///< within 3 degrees of the sun: never in the fit, the masks do not count
-  std::vector<std::uint8_t> sky;        ///< 1 = sky, as far as all of this says
-  std::vector<std::vector<int>> apart;  ///< smooth regions that pass the masks in use, but are too small to be sure
+  std::vector<std::uint8_t>
+      near_sun;                   ///< within 3 degrees of the sun: never in the fit, the masks do not count
+  std::vector<std::uint8_t> sky;  ///< 1 = sky, as far as all of this says
+  std::vector<std::vector<int>>
+      apart;  ///< smooth regions that pass the masks in use, but are too small to be sure
   double mean_luminance = 0;
   bool red_blue_used = false, luminance_used = false;
   double red_blue_share = 0;   ///< of the region that is surely sky: passes the red over blue mask

@@ -36,7 +36,7 @@ OptionTable<SkyOptions> make_table() {
       .unit("degrees")
       .range(0, 80);
   table.add("exponent", [](SkyOptions& o) -> bool& { return o.fit.free_exponent; })
-      .help("Fit the exponent h of the glow around the sun, too; else it is 1")
+      .help("Fit the exponent h of the glow around the sun, too; without it is 1")
       .source("[Jethwa04] eq. (3.2)");
   table.add("residual", [](SkyOptions& o) -> int& { return o.fit.residual_order; })
       .help("Order of spherical functions on top of the model; 0: none")

@@ -27,7 +27,8 @@ double pixel_solid_angle(const Intrinsics& k, int x, int y) {
 
 Eigen::Vector3d Equirectangular::direction(double u, double v) const {
   const double azimuth = (u / width - 0.5) * 2 * kPi, elevation = (0.5 - v / height) * kPi;
-  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth), std::sin(elevation)};
+  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
+          std::sin(elevation)};
 }
 
 Eigen::Vector2d Equirectangular::position(const Eigen::Vector3d& d) const {

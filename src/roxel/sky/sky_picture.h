@@ -48,15 +48,15 @@ class PixelRays {
 };
 
 struct SkyPicture {
-  Image rgb;           ///< linear
-  Mask valid = {};     ///< 0 where there is no data; empty = all valid
+  Image rgb;            ///< linear
+  Mask valid = {};      ///< 0 where there is no data; empty = all valid
   Mask known_sky = {};  ///< 255 where a person, or a volume, says that this is sky; empty = not known
   PixelRays rays;
   double clip = std::numeric_limits<double>::infinity();  ///< a channel of at least this is clipped
 };
 
-/// Where a picture clips: files whose values end at 1 do so just below 1; others at half float's end, or where
-/// several pixels share the highest value.
+/// Where a picture clips: files whose values end at 1 do so just below 1; others at half float's end, or
+/// where several pixels share the highest value.
 double clip_level(const Image& rgb);
 
 /// Rec. 709 luminance of linear red, green, blue.

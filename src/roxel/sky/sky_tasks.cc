@@ -28,10 +28,10 @@ Eigen::Vector3d find_up(const Dataset& dataset, std::vector<std::string>& notes)
   int axis = 0;
   cameras.cwiseAbs().maxCoeff(&axis);
   const bool near_axis = std::abs(cameras[axis]) > 0.9;
-  const Eigen::Vector3d up = near_axis ? Eigen::Vector3d(Eigen::Vector3d::Unit(axis) * (cameras[axis] > 0 ? 1 : -1))
-                                       : cameras;
-  notes.push_back(formatted("up is taken to be %.2f, %.2f, %.2f, which most cameras hold upright (--up)", up.x(),
-                            up.y(), up.z()));
+  const Eigen::Vector3d up =
+      near_axis ? Eigen::Vector3d(Eigen::Vector3d::Unit(axis) * (cameras[axis] > 0 ? 1 : -1)) : cameras;
+  notes.push_back(formatted("up is taken to be %.2f, %.2f, %.2f, which most cameras hold upright (--up)",
+                            up.x(), up.y(), up.z()));
   return up;
 }
 
@@ -107,7 +107,8 @@ std::vector<Group> group_views(const Dataset& dataset) {
 DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<double, 3>>& up) {
   DatasetSkies skies;
   const Eigen::Vector3d upwards =
-      up ? Eigen::Vector3d(Eigen::Vector3d((*up)[0], (*up)[1], (*up)[2]).normalized()) : find_up(dataset, skies.notes);
+      up ? Eigen::Vector3d(Eigen::Vector3d((*up)[0], (*up)[1], (*up)[2]).normalized())
+         : find_up(dataset, skies.notes);
   const Eigen::Matrix3d sky_from_world =
       upwards == Eigen::Vector3d::UnitZ()
           ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())

@@ -95,7 +95,8 @@ class PixelMasking {
 
   bool shines(int x, int y) const {
     const Eigen::Vector3d seen = Eigen::Vector3f(picture_.rgb.pixel(x, y)).cast<double>();
-    return luminance(seen) >= 0.7 * luminance(fit_.sky.radiance_in_sky(picture_.rays.direction(x + 0.5, y + 0.5)));
+    return luminance(seen) >=
+           0.7 * luminance(fit_.sky.radiance_in_sky(picture_.rays.direction(x + 0.5, y + 0.5)));
   }
 
   /// Reaches from pixels in facets of the fit to all that look like sky: windows hang in walls.

@@ -11,7 +11,8 @@ SphereLightSum::SphereLightSum(std::shared_ptr<const FacetSphere> sphere)
 void SphereLightSum::add(const SkyPicture& picture) {
   // Pixels that are not small beside a facet are divided, so that each part goes to the right one.
   const double facet_angle = std::sqrt(2 * sphere_->solid_angle(0));
-  const int samples = std::clamp(static_cast<int>(std::ceil(3 * picture.rays.pixel_angle() / facet_angle)), 1, 16);
+  const int samples =
+      std::clamp(static_cast<int>(std::ceil(3 * picture.rays.pixel_angle() / facet_angle)), 1, 16);
   for (int y = 0; y < picture.rays.height(); ++y)
     for (int x = 0; x < picture.rays.width(); ++x)
       if (picture.valid.empty() || picture.valid.at(x, y) == 255) add_pixel(picture, x, y, samples);
@@ -57,7 +58,8 @@ void SphereLightSum::fold() {
     total.luminance_second += sum.luminance_second;
     total.peak = std::max(total.peak, sum.peak);
     total.bright += sum.bright;
-    total.coverage = std::max(total.coverage, std::min(1.0, (sum.weight + sum.clipped) / sphere_->solid_angle(f)));
+    total.coverage =
+        std::max(total.coverage, std::min(1.0, (sum.weight + sum.clipped) / sphere_->solid_angle(f)));
     ++total.pictures;
     if (sum.weight > 0) {
       const double mean = luminance(Eigen::Vector3d(sum.first / sum.weight));

@@ -12,10 +12,10 @@ namespace roxel {
 
 /// Pixels count by their solid angle. Clipped pixels are counted, but not in means and variances.
 struct FacetLight {
-  double weight = 0;    ///< steradians of usable pixels, of all pictures together
-  double clipped = 0;   ///< steradians of clipped pixels
-  double known_sky = 0; ///< steradians that a mask by hand calls sky
-  double coverage = 0;  ///< share of the facet that the picture which sees most of it sees (clipped too)
+  double weight = 0;     ///< steradians of usable pixels, of all pictures together
+  double clipped = 0;    ///< steradians of clipped pixels
+  double known_sky = 0;  ///< steradians that a mask by hand calls sky
+  double coverage = 0;   ///< share of the facet that the picture which sees most of it sees (clipped too)
   std::int64_t pixels = 0;
   int pictures = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();      ///< radiance a channel
@@ -23,7 +23,8 @@ struct FacetLight {
   double contrast = 0;      ///< standard deviation of luminance in the facet over its mean
   double disagreement = 0;  ///< of the pictures' means of luminance: standard deviation over mean
   double peak = 0;          ///< highest luminance of a pixel, clipped ones too
-  Eigen::Vector3d bright = Eigen::Vector3d::Zero();  ///< sum of luminance x steradians x direction, clipped too
+  Eigen::Vector3d bright =
+      Eigen::Vector3d::Zero();  ///< sum of luminance x steradians x direction, clipped too
 };
 
 struct SphereLight {

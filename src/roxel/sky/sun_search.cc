@@ -41,8 +41,9 @@ FoundSun sun_of_patch(const SphereLight& light, const std::vector<int>& patch) {
   for (const int f : patch) middle += light.facets[f].bright;
   FoundSun sun{middle.normalized(), 0, true, 0};
   for (const int f : patch)
-    sun.radius_deg = std::max(
-        sun.radius_deg, std::acos(std::clamp(sun.direction.dot(light.sphere->centre(f)), -1.0, 1.0)) / kDegree);
+    sun.radius_deg =
+        std::max(sun.radius_deg,
+                 std::acos(std::clamp(sun.direction.dot(light.sphere->centre(f)), -1.0, 1.0)) / kDegree);
   return sun;
 }
 
@@ -55,7 +56,8 @@ std::optional<FoundSun> find_clipped_sun(const SphereLight& light) {
     if (seen[f] || !is_clipped(light.facets[f])) continue;
     const std::vector<int> patch = clipped_patch(light, f, seen);
     const FoundSun sun = sun_of_patch(light, patch);
-    if (sun.radius_deg > kWidestPatchDeg || sun.direction.z() < kLowestSunSine || patch.size() <= best_size) continue;
+    if (sun.radius_deg > kWidestPatchDeg || sun.direction.z() < kLowestSunSine || patch.size() <= best_size)
+      continue;
     best = sun, best_size = patch.size();
   }
   return best;
@@ -83,7 +85,8 @@ std::optional<FoundSun> find_sun(const SphereLight& light) {
   const Eigen::Vector3d start = light.facets[brightest].bright.normalized();
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (int f = 0; f < light.sphere->count(); ++f)
-    if (light.facets[f].peak > 0.05 * peak && light.sphere->centre(f).dot(start) > std::cos(kClusterDeg * kDegree))
+    if (light.facets[f].peak > 0.05 * peak &&
+        light.sphere->centre(f).dot(start) > std::cos(kClusterDeg * kDegree))
       middle += light.facets[f].bright;
   return FoundSun{middle.normalized(), contrast, false, kClusterDeg};
 }
@@ -93,9 +96,11 @@ SunMeasure measure_sun(const SkyPicture& picture, const Eigen::Vector3d& sun) {
   const double radius = std::max(1.2 * kDegree, 4 * picture.rays.pixel_angle());
   const auto at = picture.rays.position(sun);
   const double reach = 2.5 * radius / picture.rays.pixel_angle() * 1.5;
-  if (!at || at->x() < 0 || at->y() < 0 || at->x() >= picture.rays.width() || at->y() >= picture.rays.height())
+  if (!at || at->x() < 0 || at->y() < 0 || at->x() >= picture.rays.width() ||
+      at->y() >= picture.rays.height())
     return measure;
-  const int x0 = std::max(0, static_cast<int>(at->x() - reach)), y0 = std::max(0, static_cast<int>(at->y() - reach));
+  const int x0 = std::max(0, static_cast<int>(at->x() - reach)),
+            y0 = std::max(0, static_cast<int>(at->y() - reach));
   const int x1 = std::min(picture.rays.width(), static_cast<int>(at->x() + reach) + 1);
   const int y1 = std::min(picture.rays.height(), static_cast<int>(at->y() + reach) + 1);
   double inner = 0, ring = 0, peak = 0;
@@ -114,7 +119,8 @@ SunMeasure measure_sun(const SkyPicture& picture, const Eigen::Vector3d& sun) {
         ring += weight, ring_light += weight * rgb;
       }
     }
-  const double cap = 2 * std::numbers::pi * (1 - std::cos(radius)), wide = 2 * std::numbers::pi * (1 - std::cos(2 * radius));
+  const double cap = 2 * std::numbers::pi * (1 - std::cos(radius)),
+               wide = 2 * std::numbers::pi * (1 - std::cos(2 * radius));
   measure.in_view = inner > 0.95 * cap && ring > 0.9 * (wide - cap);
   if (!measure.in_view) return measure;
   const Eigen::Vector3d around = ring_light / ring;

@@ -10,9 +10,9 @@ namespace roxel {
 
 struct FoundSun {
   Eigen::Vector3d direction;  ///< unit, sky frame
-  double contrast = 0;        ///< its peak over the median luminance above the horizon; clipped: a lower bound
-  bool clipped = false;       ///< direction is the middle of a clipped patch
-  double radius_deg = 0;      ///< of the patch or cluster
+  double contrast = 0;    ///< its peak over the median luminance above the horizon; clipped: a lower bound
+  bool clipped = false;   ///< direction is the middle of a clipped patch
+  double radius_deg = 0;  ///< of the patch or cluster
 };
 
 /// The brightest cluster above the horizon. None where nothing stands out: less than 30 times the median for
@@ -24,7 +24,8 @@ struct SunMeasure {
   bool in_view = false;  ///< with a margin of twice the radius that is summed over
   bool clipped = false;
   bool shines = false;  ///< much brighter than what is around it
-  Eigen::Vector3d irradiance = Eigen::Vector3d::Zero();  ///< on a surface that faces it, sky around it taken off
+  Eigen::Vector3d irradiance =
+      Eigen::Vector3d::Zero();  ///< on a surface that faces it, sky around it taken off
 };
 
 /// Sums radiance over a small disc around the sun (unit, sky frame).
