@@ -25,6 +25,7 @@ constexpr double kPriorStrength = 2e-5;  ///< as much as a relative error of 0.7
 constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
+constexpr double kSurelySun = 30;  ///< contrast of a spot worth a warning: lamps and white walls have less
 
 double angle_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::acos(std::clamp(a.dot(b), -1.0, 1.0)) / kDegree;
@@ -109,7 +110,8 @@ class Fitting {
   }
 
   void find_suns() {
-    if (const auto found = find_sun(out_.light)) sky().sun_by_images = found->direction;
+    const auto found = find_sun(out_.light);
+    if (found) sky().sun_by_images = found->direction;
     if (!sky().sun_by_images) return;
     if (!known_sun()) {
       use_sun(SunSource::kImages, *sky().sun_by_images);
@@ -117,7 +119,7 @@ class Fitting {
       return;
     }
     const double apart = angle_deg(sky().sun, *sky().sun_by_images);
-    if (apart > kSunsDifferDeg)
+    if (apart > kSunsDifferDeg && found->contrast > kSurelySun)
       out_.warnings.push_back(
           formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
                     "reflection, or a wrong time, place or north",

@@ -1,5 +1,6 @@
 #include "roxel/sky/sky_tasks.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -13,18 +14,30 @@ namespace {
 
 constexpr double kSameSky_s = 900;
 
-/// The direction that cameras hold upright, on average.
-Eigen::Vector3d mean_camera_up(const std::vector<View>& views) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const View& view : views) sum -= view.camera.pose.rotation.row(1).transpose();
-  return sum.norm() > 0 ? Eigen::Vector3d(sum.normalized()) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+/// The direction that cameras hold upright: cameras tilt, but they seldom roll, so it is the one that their
+/// rows of pixels are most at right angles to.
+Eigen::Vector3d camera_up(const std::vector<View>& views) {
+  Eigen::Matrix3d rows = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d upright = Eigen::Vector3d::Zero();
+  for (const View& view : views) {
+    const Eigen::Vector3d row = view.camera.pose.rotation.row(0).transpose();
+    rows += row * row.transpose();
+    upright -= view.camera.pose.rotation.row(1).transpose();
+  }
+  if (!(upright.norm() > 0)) return Eigen::Vector3d::UnitZ();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(rows);
+  // Views of one direction alone leave the angle open.
+  const bool clear = axes.eigenvalues()[1] > 0.02 * static_cast<double>(views.size());
+  const Eigen::Vector3d up =
+      clear ? Eigen::Vector3d(axes.eigenvectors().col(0)) : Eigen::Vector3d(upright.normalized());
+  return up.dot(upright) < 0 ? Eigen::Vector3d(-up) : up;
 }
 
 Eigen::Vector3d find_up(const Dataset& dataset, std::vector<std::string>& notes) {
   const bool placed = std::any_of(dataset.views.begin(), dataset.views.end(),
                                   [](const View& v) { return v.latitude_deg && v.longitude_deg; });
-  const Eigen::Vector3d cameras = mean_camera_up(dataset.views);
-  if (placed || cameras.z() > 0.7) return Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d cameras = camera_up(dataset.views);
+  if (placed || cameras.z() > 0.9) return Eigen::Vector3d::UnitZ();
   int axis = 0;
   cameras.cwiseAbs().maxCoeff(&axis);
   const bool near_axis = std::abs(cameras[axis]) > 0.9;

@@ -8,7 +8,7 @@ namespace roxel {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kLeastContrast = 30;
+constexpr double kLeastContrast = 12;
 constexpr double kWidestPatchDeg = 7.5;  ///< radius
 constexpr double kClusterDeg = 3;
 constexpr double kLowestSunSine = -0.02;
@@ -78,7 +78,7 @@ std::optional<FoundSun> find_sun(const SphereLight& light) {
   if (light.facets[brightest].clipped > 0) {
     auto sun = find_clipped_sun(light);
     if (sun) sun->contrast = contrast;
-    return sun;
+    if (sun) return sun;
   }
   if (!(contrast >= kLeastContrast)) return std::nullopt;
   // The facet's own middle of light first, then all light around it.
@@ -88,7 +88,7 @@ std::optional<FoundSun> find_sun(const SphereLight& light) {
     if (light.facets[f].peak > 0.05 * peak &&
         light.sphere->centre(f).dot(start) > std::cos(kClusterDeg * kDegree))
       middle += light.facets[f].bright;
-  return FoundSun{middle.normalized(), contrast, false, kClusterDeg};
+  return FoundSun{middle.normalized(), contrast, light.facets[brightest].clipped > 0, kClusterDeg};
 }
 
 SunMeasure measure_sun(const SkyPicture& picture, const Eigen::Vector3d& sun) {

@@ -15,8 +15,8 @@ struct FoundSun {
   double radius_deg = 0;  ///< of the patch or cluster
 };
 
-/// The brightest cluster above the horizon. None where nothing stands out: less than 30 times the median for
-/// unclipped pictures, no clipped patch under 15 degrees across otherwise.
+/// The brightest cluster above the horizon. None where nothing stands out: no clipped patch under 15 degrees
+/// across, and no pixel 12 times brighter than the median.
 std::optional<FoundSun> find_sun(const SphereLight& light);
 
 /// What a picture tells of the light of a sun in a known direction.
