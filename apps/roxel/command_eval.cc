@@ -9,6 +9,7 @@
 #include "roxel/base/error.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
+#include "roxel/io/sky_truth.h"
 #include "roxel/report/html_report.h"
 #include "roxel/report/measure_plots.h"
 #include "roxel/report/pictures.h"
@@ -49,7 +50,7 @@ OptionTable<TruthOptions> truth_table() {
   table.add("truth", &TruthOptions::truth)
       .help(
           "Folder with depth/NAME.exr (true distance along the optical axis, 0 = no surface), mesh.ply, "
-          "albedo/NAME.exr, transforms_test.json (held-out views); "
+          "albedo/NAME.exr, transforms_test.json (held-out views), illumination.json (light of nodes); "
           "what is missing is not measured")
       .placeholder("DIR")
       .unset("the data set, where it has any of that");
@@ -140,7 +141,7 @@ Sources sources_of(const EvalSource& source) {
 /// What was asked for by name must give something.
 void check_measured(const EvalOptions& options, const RunMeasures& measures) {
   const bool by_truth = !measures.depth.empty() || measures.volume || !measures.surfaces.empty() ||
-                        measures.color || !measures.held_out.empty();
+                        measures.color || !measures.held_out.empty() || !measures.skies.empty();
   if (options.truth.truth && !by_truth) {
     std::string found = "nothing to measure " + measures.run + " by";
     for (const std::string& note : measures.notes) found += "; " + note;
@@ -201,7 +202,7 @@ void remove_older(const fs::path& folder) {
   for (const char* name : {"metrics.json", "report.html", "section_x.svg", "section_y.svg", "section_z.svg"})
     remove_file(folder / name);
   for (const char* name : {"depth", "depth_error_over_sigma", "opacity_reliability", "surfaces",
-                           "voxel_distances", "voxel_opacities", "images", "held_out"})
+                           "voxel_distances", "voxel_opacities", "images", "held_out", "skies"})
     for (const char* suffix : {".csv", ".svg"}) remove_file(folder / (std::string(name) + suffix));
   const auto surface_plot = [&](int number) {
     return folder / ("surface_" + std::to_string(number) + ".svg");
@@ -221,8 +222,41 @@ void write_files(const fs::path& folder, const EvalSource& source, const RunMeas
   write_text_atomically(folder / "metrics.json", json + "\n");
 }
 
+/// A run of `roxel sky`: there is nothing to measure but the light.
+int run_eval_sky(const Invocation& invocation, const EvalOptions& options, Session& session) {
+  const fs::path run = invocation.inputs.front();
+  const std::string dataset = read_from_summary(
+      run, [&] { return read_summary(run).value("/dataset/path"_json_pointer, std::string()); });
+  const fs::path truth = options.truth.truth.value_or(options.truth.dataset.value_or(dataset));
+  if (truth.empty() || !has_sky_truth(truth))
+    throw_invalid("--truth " + truth.string(), "no illumination.json in it", "the true light of the nodes");
+  RunMeasures measures;
+  measures.run = run.string();
+  measures.truth = truth.string();
+  measures.skies = measure_skies(run, truth, session.context().thread_count());
+  if (measures.skies.empty())
+    throw_invalid((truth / "illumination.json").string(), "no node of the run",
+                  "nodes named as in " + run.string());
+  const std::string json =
+      json_text({{"run", measures.run}, {"truth", truth.string()}, {"skies", to_json(measures.skies)}});
+  if (!invocation.output.empty()) {
+    protect_sources(invocation.output, {{run, truth}});
+    const OutputFolder folder(invocation.output);
+    PartialResults partial(folder.path());
+    write_text_atomically(partial.path() / "skies.csv", csv_table(measures.skies));
+    write_text_atomically(partial.path() / "metrics.json", json + "\n");
+    partial.publish([&] { remove_older(folder.path()); });
+  }
+  session.display().clear();
+  print_result(options.common, to_text(measures), json);
+  return 0;
+}
+
 int run_eval(const Invocation& invocation, const EvalOptions& options) {
   Session session(options.common);
+  const fs::path path = invocation.inputs.front();
+  if (!fs::exists(path / "volume.vdb") && fs::is_directory(path / "sky"))
+    return run_eval_sky(invocation, options, session);
   const MeasureOptions wanted = measure_options(options.measures);
   const EvalSource source = read_eval_source(
       {invocation.inputs.front(), options.truth.truth, options.truth.dataset, options.measures.estimate},

@@ -50,9 +50,9 @@ OptionTable<CommonOptions> make_common_table() {
   return table;
 }
 
-OptionTable<InputOptions> make_input_table() {
+OptionTable<InputOptions> make_input_table(bool masks) {
   OptionTable<InputOptions> table;
-  table.group("Input");
+  table.group(masks ? "Input" : "Photographs");
   table.add("format", &InputOptions::format)
       .help("Format of the data set; auto: by what is in the folder")
       .placeholder("auto|colmap|transforms|middlebury|strecha|krt");
@@ -64,9 +64,10 @@ OptionTable<InputOptions> make_input_table() {
       .help("Use only capture nodes A to B - 1, counted from 0; either may be left out")
       .placeholder("A:B")
       .unset("all");
-  table.add("masks", &InputOptions::masks)
-      .help("Folder of masks; auto: those of the data set; none: no masks")
-      .placeholder("auto|none|FOLDER");
+  if (masks)
+    table.add("masks", &InputOptions::masks)
+        .help("Folder of masks; auto: those of the data set; none: no masks")
+        .placeholder("auto|none|FOLDER");
   table.add("response", &InputOptions::response)
       .help("How stored values follow from light; auto: sRGB for 8 and 16 bits, linear for float")
       .placeholder("auto|srgb|linear|gamma:G");
@@ -81,7 +82,12 @@ const OptionTable<CommonOptions>& common_option_table() {
 }
 
 const OptionTable<InputOptions>& input_option_table() {
-  static const OptionTable<InputOptions> table = make_input_table();
+  static const OptionTable<InputOptions> table = make_input_table(true);
+  return table;
+}
+
+const OptionTable<InputOptions>& reading_option_table() {
+  static const OptionTable<InputOptions> table = make_input_table(false);
   return table;
 }
 

@@ -34,6 +34,8 @@ struct InputOptions {
 };
 
 const OptionTable<InputOptions>& input_option_table();
+/// The same without masks, for what does not look at objects.
+const OptionTable<InputOptions>& reading_option_table();
 
 /// A data set that was read, and how to get at its pixels.
 struct Input {

@@ -10,6 +10,7 @@
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
 #include "roxel/io/ply_file.h"
+#include "roxel/io/sky_truth.h"
 #include "roxel/report/pictures.h"
 #include "roxel/solve/gains.h"
 #include "run_renderer.h"
@@ -79,6 +80,7 @@ class Measurement {
     report(0.7);
     measure_held_out();
     measure_colors();
+    measure_light();
     take_sections();
     return std::move(out_);
   }
@@ -357,6 +359,11 @@ class Measurement {
       if (const auto pair = color_pair(&rendering.rgb.data()[3 * i], opacity, &albedo.data()[3 * i]))
         pairs.push_back(*pair);
     }
+  }
+
+  void measure_light() {
+    if (source_.truth && has_sky_truth(*source_.truth) && fs::is_directory(source_.run.path / "sky"))
+      out_.skies = measure_skies(source_.run.path, *source_.truth, threads_);
   }
 
   void take_sections() {

@@ -2,6 +2,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/io/ply_file.h"
+#include "roxel/io/sky_truth.h"
 
 namespace roxel::cli {
 namespace {
@@ -63,10 +64,10 @@ void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSou
 std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& source) {
   if (paths.truth) {
     if (!has_truth(*paths.truth))
-      throw_invalid(
-          "--truth " + *paths.truth,
-          "no folder depth or albedo, no mesh.ply and no transforms_test.json in it",
-          "depth/NAME.exr or albedo/NAME.exr for the images of the run, mesh.ply, or held-out views");
+      throw_invalid("--truth " + *paths.truth,
+                    "no folder depth or albedo, no mesh.ply, transforms_test.json or illumination.json in it",
+                    "depth/NAME.exr or albedo/NAME.exr for the images of the run, mesh.ply, held-out views, "
+                    "or the light of nodes");
     return *paths.truth;
   }
   const fs::path dataset = paths.dataset.value_or(source.run.file.info.dataset);
@@ -112,7 +113,8 @@ Response EvalSource::picture_response() const {
 
 bool has_truth(const fs::path& folder) {
   return fs::is_directory(folder / "depth") || fs::is_directory(folder / "albedo") ||
-         fs::is_regular_file(folder / "mesh.ply") || fs::is_regular_file(folder / "transforms_test.json");
+         fs::is_regular_file(folder / "mesh.ply") || fs::is_regular_file(folder / "transforms_test.json") ||
+         has_sky_truth(folder);
 }
 
 std::optional<fs::path> truth_file(const fs::path& truth, const std::string& kind, const std::string& name) {

@@ -289,7 +289,7 @@ std::string color_text(const std::optional<ColorAccuracy>& color) {
 
 bool RunMeasures::empty() const {
   return depth.empty() && reprojection.empty() && surfaces.empty() && !volume && images.empty() &&
-         held_out.empty() && !color;
+         held_out.empty() && !color && skies.empty();
 }
 
 DepthAccuracy total_depth(const std::vector<NamedDepthAccuracy>& views) {
@@ -333,6 +333,7 @@ ordered_json to_json(const RunMeasures& measures) {
   json["reprojection"] = ordered_json::array();
   for (const auto& [name, rms] : measures.reprojection)
     json["reprojection"].push_back({{"name", name}, {"rms_percent", rms}});
+  if (!measures.skies.empty()) json["skies"] = to_json(measures.skies);
   json["notes"] = measures.notes;
   return json;
 }
@@ -349,6 +350,7 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& m
   if (measures.volume) tables.emplace_back("voxel_distances.csv", histogram_csv(measures.volume->histogram));
   if (!measures.images.empty()) tables.emplace_back("images.csv", quality_csv(measures.images));
   if (!measures.held_out.empty()) tables.emplace_back("held_out.csv", quality_csv(measures.held_out));
+  if (!measures.skies.empty()) tables.emplace_back("skies.csv", csv_table(measures.skies));
   return tables;
 }
 
@@ -357,7 +359,7 @@ std::string to_text(const RunMeasures& measures, std::size_t most_views) {
   if (!measures.depth.empty()) text += depth_accuracy_table(measures.depth, most_views) + "\n";
   text += surfaces_text(measures) + volume_text(measures) + quality_text("images", measures.images) +
           quality_text("held-out images", measures.held_out) + calibration_text(measures) +
-          color_text(measures.color);
+          color_text(measures.color) + to_text(measures.skies);
   if (measures.reprojection_rms_percent)
     text += formatted("reprojection error %.2f %% of full scale\n", *measures.reprojection_rms_percent);
   for (const std::string& note : measures.notes) text += "note: " + note + "\n";

@@ -15,6 +15,7 @@
 #include "roxel/eval/section.h"
 #include "roxel/eval/surface_accuracy.h"
 #include "roxel/eval/volume_accuracy.h"
+#include "roxel/report/sky_measures.h"
 
 namespace roxel {
 
@@ -49,6 +50,7 @@ struct RunMeasures {
   std::vector<NamedImageQuality> held_out;  ///< views that the run has not seen
   std::optional<ColorAccuracy> color;
   std::vector<Section> sections;  ///< with the true outline
+  std::vector<SkyMeasure> skies;
   std::vector<std::string> notes;
 
   double box_diagonal() const { return box.isEmpty() ? 0.0 : box.diagonal().norm(); }

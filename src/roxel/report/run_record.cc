@@ -13,8 +13,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr int kFormat = 1;
-
 const char* background_name(BackgroundKind kind) {
   switch (kind) {
     case BackgroundKind::kNone:
@@ -126,7 +124,7 @@ ordered_json list(const std::vector<T>& items, ToJson to) {
 
 ordered_json to_json(const RunRecord& record) {
   const Summary& summary = record.summary;
-  return {{"format", kFormat},
+  return {{"format", kSummaryFormat},
           {"version", ROXEL_VERSION},
           {"command", record.command_line},
           {"dataset",
@@ -188,8 +186,8 @@ json read_summary(const fs::path& run) {
     throw_invalid(file.string(), std::string("a syntax error (") + error.what() + ")", "what roxel wrote");
   }
   const bool ours = summary.is_object() && summary.value("format", json()).is_number_integer();
-  if (!ours || summary["format"] != kFormat)
-    throw_invalid(file.string(), "another format", "format " + std::to_string(kFormat) + " of roxel");
+  if (!ours || summary["format"] != kSummaryFormat)
+    throw_invalid(file.string(), "another format", "format " + std::to_string(kSummaryFormat) + " of roxel");
   return summary;
 }
 

@@ -15,6 +15,9 @@
 
 namespace roxel {
 
+/// The `format` of summary.json, of reconstructions and of `roxel sky`.
+inline constexpr int kSummaryFormat = 1;
+
 /// What is reported of one view. RMS in percent of full scale over the pixels that show the object.
 struct ViewFigures {
   std::string name;

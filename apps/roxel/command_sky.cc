@@ -1,0 +1,250 @@
+/// roxel sky: the light of every node, without a reconstruction.
+
+#include <chrono>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "command.h"
+#include "roxel/base/atomic_file.h"
+#include "roxel/base/error.h"
+#include "roxel/base/formatted.h"
+#include "roxel/base/parallel.h"
+#include "roxel/io/image_file.h"
+#include "roxel/io/sky_file.h"
+#include "roxel/report/pictures.h"
+#include "roxel/report/run_record.h"
+#include "roxel/report/sky_pictures.h"
+#include "sky_input.h"
+
+namespace roxel::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr Response kAsItIs{ResponseCurve::kLinear};
+
+struct SkyCommandOptions {
+  InputOptions input;
+  SkyOptions sky;
+  bool pictures = true;
+  CommonOptions common;
+};
+
+OptionTable<SkyCommandOptions> sky_table() {
+  OptionTable<SkyCommandOptions> table;
+  table.include(reading_option_table(), &SkyCommandOptions::input);
+  table.include(sky_option_table(), &SkyCommandOptions::sky);
+  table.group("Sky files");
+  table.add("pictures", &SkyCommandOptions::pictures)
+      .help("Write pictures of the sphere, masks, fit and error, too");
+  table.include(common_option_table(), &SkyCommandOptions::common);
+  return table;
+}
+
+/// What is reported of one node.
+struct NodeReport {
+  ordered_json json;
+  std::string line;
+  std::vector<std::string> warnings;
+};
+
+ordered_json triple(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+
+ordered_json sun_json(const std::optional<Eigen::Vector3d>& d) {
+  if (!d) return nullptr;
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  const double azimuth = std::atan2(d->x(), d->y()) * kDegrees;
+  return {azimuth < 0 ? azimuth + 360 : azimuth, std::asin(std::clamp(d->z(), -1.0, 1.0)) * kDegrees};
+}
+
+std::optional<Eigen::Vector3d> used_sun(const NodeSky& sky) {
+  return sky.sun_source == SunSource::kNone ? std::nullopt : std::optional(sky.sun);
+}
+
+ordered_json masks_json(const SkyFit& fit) {
+  const SkyMasks& m = fit.masks;
+  return {{"red_blue", m.red_blue_used ? "used" : "left out"},
+          {"red_blue_share", m.red_blue_share},
+          {"luminance", m.luminance_used ? "used" : "left out"},
+          {"luminance_share", m.luminance_share},
+          {"mean_luminance", m.mean_luminance},
+          {"reason", m.reason}};
+}
+
+ordered_json node_json(const SkyFit& fit, double mask_share) {
+  const NodeSky& s = fit.sky;
+  const SkyLight light(s);
+  return {{"node", s.name},
+          {"images", s.views.size()},
+          {"model", to_string(s.model)},
+          {"fallback", s.fallback},
+          {"mean_error", s.mean_error},
+          {"relative_sigma", triple(s.relative_sigma)},
+          {"facets_used", std::count(fit.used.begin(), fit.used.end(), 1)},
+          {"sky_share", s.sky_share},
+          {"seen_share", s.seen_share},
+          {"mask_share", mask_share},
+          {"disagreement", s.mean_disagreement},
+          {"rounds", fit.rounds},
+          {"settled", fit.settled},
+          {"masks", masks_json(fit)},
+          {"clearness_bin", s.clearness_bin},
+          {"sun", sun_json(used_sun(s))},
+          {"sun_source", to_string(s.sun_source)},
+          {"sun_by_time", sun_json(s.sun_by_time)},
+          {"sun_by_images", sun_json(s.sun_by_images)},
+          {"sun_light", to_string(s.sun_light)},
+          {"sun_irradiance", triple(s.sun_irradiance)},
+          {"horizontal_irradiance", triple(light.horizontal_irradiance(Disc::kWith))},
+          {"horizontal_irradiance_without_disc", triple(light.horizontal_irradiance(Disc::kWithout))},
+          {"mean_radiance", triple(light.mean_radiance(Disc::kWith))},
+          {"warnings", fit.warnings}};
+}
+
+std::string node_line(const SkyFit& fit) {
+  const NodeSky& s = fit.sky;
+  std::string line = formatted("  %-6s %-9s", s.name.c_str(), to_string(s.model));
+  if (s.has_light())
+    line += formatted(" error %4.1f %% over %4.1f %% of the dome", 100 * s.mean_error, 100 * s.sky_share);
+  if (const auto sun = used_sun(s)) {
+    const ordered_json angles = sun_json(sun);
+    line += formatted("; sun %.1f, %.1f (%s), light %s", angles[0].get<double>(), angles[1].get<double>(),
+                      to_string(s.sun_source), to_string(s.sun_light));
+  }
+  if (!s.fallback.empty()) line += "; " + s.fallback;
+  return line + "\n";
+}
+
+void write_pictures(const fs::path& run, const SkyFit& fit) {
+  const std::vector<SkyPanel> panels = sky_panels(fit);
+  std::vector<std::vector<Image>> sheet;
+  for (std::size_t i = 0; i < panels.size(); ++i) {
+    write_png(sky_path(run, fit.sky.name, "_" + panels[i].name + ".png").string(), panels[i].picture,
+              kAsItIs);
+    if (i % 2 == 0) sheet.emplace_back();
+    sheet.back().push_back(panels[i].picture);
+  }
+  write_png(sky_path(run, fit.sky.name, ".png").string(), contact_sheet(sheet), kAsItIs);
+}
+
+/// A mask by hand stands; the others come from the fit. Returns the share of pixels that are sky.
+double write_masks(const fs::path& run, const SkyFit& fit, const SkyPictureSource& pictures) {
+  double sky = 0, all = 0;
+  for (std::size_t i = 0; i < fit.sky.views.size(); ++i) {
+    const SkyPicture picture = pictures(static_cast<int>(i));
+    const Mask mask = picture.known_sky.empty() ? soft_sky_mask(picture, fit) : picture.known_sky;
+    write_png(sky_mask_path(run, fit.sky.views[i]).string(), mask);
+    for (const std::uint8_t value : mask.data()) sky += value / 255.0;
+    all += static_cast<double>(mask.data().size());
+  }
+  return all > 0 ? sky / all : 0;
+}
+
+NodeReport do_node(const SkyTask& task, const SkyPictureSource& pictures, const SkyCommandOptions& options,
+                   const fs::path& run) {
+  const SkyFit fit = fit_sky(task, pictures, options.sky.fit_options());
+  write_sky(run, fit.sky);
+  const double mask_share = write_masks(run, fit, pictures);
+  if (options.pictures) write_pictures(run, fit);
+  NodeReport report{node_json(fit, mask_share), node_line(fit), {}};
+  for (const std::string& warning : fit.warnings) report.warnings.push_back(task.name + ": " + warning);
+  return report;
+}
+
+std::vector<NodeReport> do_nodes(const SkyInput& input, const SkyCommandOptions& options, const fs::path& run,
+                                 Session& session) {
+  std::vector<NodeReport> reports(input.tasks.size());
+  std::mutex mutex;
+  std::size_t done = 0;
+  parallel_for(static_cast<std::int64_t>(reports.size()), session.context().thread_count(),
+               [&](std::int64_t n, int) {
+                 session.context().throw_if_cancelled();
+                 reports[n] = do_node(input.tasks[n], input.pictures[n], options, run);
+                 const std::lock_guard<std::mutex> lock(mutex);
+                 Progress progress;
+                 progress.stage = "sky";
+                 progress.fraction = static_cast<double>(++done) / static_cast<double>(reports.size());
+                 session.context().report(progress);
+               });
+  return reports;
+}
+
+ordered_json summary_json(const Invocation& invocation, const SkyInput& input, const ordered_json& options,
+                          const std::vector<NodeReport>& reports, double seconds) {
+  std::size_t images = 0;
+  ordered_json skies = ordered_json::array(), warnings = ordered_json::array();
+  for (const SkyTask& task : input.tasks) images += task.views.size();
+  for (const NodeReport& report : reports) {
+    skies.push_back(report.json);
+    for (const std::string& warning : report.warnings) warnings.push_back(warning);
+  }
+  return {
+      {"format", kSummaryFormat},
+      {"version", ROXEL_VERSION},
+      {"command", invocation.line},
+      {"dataset",
+       {{"path", input.path}, {"format", input.format}, {"images", images}, {"nodes", input.tasks.size()}}},
+      {"options", options},
+      {"termination", "done"},
+      {"seconds", seconds},
+      {"skies", skies},
+      {"notes", input.notes},
+      {"warnings", warnings}};
+}
+
+/// A folder of this command's results may be written anew, one of a reconstruction may not.
+void check_output(const fs::path& run) {
+  if (fs::exists(run / "volume.vdb"))
+    throw_invalid("-o " + run.string(), "a reconstruction", "another folder: its summary.json would be lost");
+}
+
+void remove_older(const fs::path& run) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(run / "summary.json")) return;
+  fs::remove(run / "summary.json", ignored);
+  if (!fs::is_symlink(run / "sky")) fs::remove_all(run / "sky", ignored);
+}
+
+std::string text_of(const SkyInput& input, const std::vector<NodeReport>& reports, const fs::path& run) {
+  std::string text;
+  for (const NodeReport& report : reports) text += report.line;
+  for (const std::string& note : input.notes) text += "  " + note + "\n";
+  return text + formatted("%zu skies written to %s\n", reports.size(), run.string().c_str());
+}
+
+int run_sky(const Invocation& invocation, const SkyCommandOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  Session session(options.common);
+  const SkyInput input = read_sky_input(invocation.inputs.front(), options.input, options.sky, session);
+  check_output(invocation.output);
+  Sources sources;
+  if (input.input) sources.dataset = &input.input->dataset;
+  protect_sources(invocation.output, sources);
+  const OutputFolder folder(invocation.output);
+  PartialResults partial(folder.path());
+  const std::vector<NodeReport> reports = do_nodes(input, options, partial.path(), session);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const ordered_json summary =
+      summary_json(invocation, input, ordered_json(sky_table().to_json(options)), reports, seconds);
+  write_text_atomically(partial.path() / "summary.json", json_text(summary));
+  partial.publish([&] { remove_older(folder.path()); });
+  session.display().clear();
+  for (const auto& warning : summary["warnings"]) warn(options.common, warning.get<std::string>());
+  print_result(options.common, text_of(input, reports, invocation.output), json_text(summary));
+  return 0;
+}
+
+}  // namespace
+
+void add_sky(Commands& commands) {
+  CommandForm form{"sky", "Find the daylight of each node: sky, sun and sky masks", "DATASET", "RUN"};
+  form.details =
+      "DATASET may also be one panorama of all directions (EXR, HDR, ...). Writes RUN/sky/NODE.json and "
+      ".exr,\n"
+      "RUN/sky/mask/NAME.png, pictures, and RUN/summary.json.\n";
+  add_command(commands, form, sky_table(), run_sky);
+}
+
+}  // namespace roxel::cli

@@ -1,0 +1,26 @@
+#pragma once
+/// What `roxel sky` reads: a data set, or one panorama.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common.h"
+#include "roxel/sky/sky_options.h"
+#include "roxel/sky/sky_tasks.h"
+
+namespace roxel::cli {
+
+struct SkyInput {
+  std::optional<Input> input;  ///< none for a panorama
+  std::string path, format;
+  std::vector<SkyTask> tasks;
+  std::vector<SkyPictureSource> pictures;  ///< of each task
+  std::vector<std::string> notes;
+};
+
+/// Throws InvalidInput, also for masks by hand that no image has.
+SkyInput read_sky_input(const std::string& path, const InputOptions& input, const SkyOptions& options,
+                        const Session& session);
+
+}  // namespace roxel::cli

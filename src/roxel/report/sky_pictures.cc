@@ -1,0 +1,116 @@
+#include "roxel/report/sky_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "roxel/report/pictures.h"
+
+namespace roxel {
+namespace {
+
+constexpr float kUnseen = 0.15f, kNotUsed = 0.35f;
+
+/// Radiance shown as white: little above what most of the sky has.
+double white_of(const SkyFit& fit) {
+  std::vector<double> values;
+  for (const bool used : {true, false}) {
+    for (int f = 0; f < fit.light.sphere->count(); ++f)
+      if (fit.light.facets[f].weight > 0 && (!used || fit.used[f]))
+        values.push_back(luminance(fit.light.facets[f].mean));
+    if (values.empty()) continue;
+    std::sort(values.begin(), values.end());
+    return 1.5 * values[values.size() * 9 / 10];
+  }
+  return 1;
+}
+
+/// One panel, by the facet and direction of each pixel.
+template <class Shade>
+Image panel(const SkyFit& fit, int width, const Shade& shade) {
+  const Equirectangular frame{width, width / 2};
+  Image picture(width, width / 3, 3);
+  for (int y = 0; y < picture.height(); ++y)
+    for (int x = 0; x < width; ++x) {
+      const Eigen::Vector3d direction = frame.direction(x + 0.5, y + 0.5);
+      const Eigen::Vector3f color = shade(fit.light.sphere->facet_at(direction), direction);
+      std::copy_n(color.data(), 3, picture.pixel(x, y));
+    }
+  return picture;
+}
+
+Eigen::Vector3f grey(float value) { return Eigen::Vector3f::Constant(value); }
+
+Eigen::Vector3f shown(const Eigen::Vector3d& radiance, double white) {
+  Eigen::Vector3f out;
+  for (int c = 0; c < 3; ++c)
+    out[c] = encode(Response{}, std::clamp(static_cast<float>(radiance[c] / white), 0.0f, 1.0f));
+  return out;
+}
+
+/// Black, violet, red, yellow, white.
+Eigen::Vector3f heat(double share) {
+  const auto ramp = [&](double from, double to) {
+    return static_cast<float>(std::clamp((share - from) / (to - from), 0.0, 1.0));
+  };
+  const float violet = share < 0.25 ? ramp(0, 0.25) : 1 - ramp(0.25, 0.5);
+  return {ramp(0, 0.5), ramp(0.4, 0.8), std::max(0.6f * violet, ramp(0.8, 1))};
+}
+
+class Panels {
+ public:
+  Panels(const SkyFit& fit, int width) : fit_(fit), width_(width), white_(white_of(fit)) {}
+
+  std::vector<SkyPanel> take() {
+    const SkyMasks& m = fit_.masks;
+    return {
+        {"seen", "as the images show it", picture([&](int f, const auto&) { return seen(f); })},
+        masked("variance", "too much contrast", m.variance, {1, 0.1f, 0.1f}),
+        masked("red_blue", m.red_blue_used ? "not blue" : "not blue (left out)", m.red_blue, {1, 0.9f, 0.1f}),
+        masked("luminance", m.luminance_used ? "dark" : "dark (left out)", m.luminance, {0.1f, 0.9f, 0.2f}),
+        masked("used", "facets of the fit", fit_.used, {0.1f, 0.4f, 1}),
+        {"fit", "fitted sky", picture([&](int, const auto& d) { return fitted(d); })},
+        {"error", "error of the fit", picture([&](int f, const auto&) { return error(f); })}};
+  }
+
+ private:
+  template <class Shade>
+  Image picture(const Shade& shade) const {
+    return panel(fit_, width_, shade);
+  }
+
+  Eigen::Vector3f seen(int f) const {
+    const FacetLight& facet = fit_.light.facets[f];
+    if (facet.clipped > facet.weight) return grey(1);
+    return facet.weight > 0 ? shown(facet.mean, white_) : grey(kUnseen);
+  }
+
+  SkyPanel masked(const char* name, const char* caption, const std::vector<std::uint8_t>& mask,
+                  const Eigen::Vector3f& color) const {
+    return {name, caption, picture([&](int f, const auto& direction) -> Eigen::Vector3f {
+              const bool shows = mask[f] && direction.z() > 0 && fit_.light.facets[f].pictures > 0;
+              return shows ? Eigen::Vector3f(0.45f * seen(f) + 0.55f * color) : seen(f);
+            })};
+  }
+
+  Eigen::Vector3f fitted(const Eigen::Vector3d& direction) const {
+    if (direction.z() < 0 || !fit_.sky.has_light()) return grey(kUnseen);
+    return shown(fit_.sky.radiance_in_sky(direction), white_);
+  }
+
+  Eigen::Vector3f error(int f) const {
+    if (!fit_.used[f]) return grey(kNotUsed);
+    const Eigen::Vector3d model = fit_.sky.radiance_in_sky(fit_.light.sphere->centre(f));
+    const Eigen::Array3d ratio = model.array() / fit_.light.facets[f].mean.array();
+    return heat((ratio - 1).abs().mean() / kHottestSkyError);
+  }
+
+  const SkyFit& fit_;
+  int width_;
+  double white_;
+};
+
+}  // namespace
+
+std::vector<SkyPanel> sky_panels(const SkyFit& fit, int width) { return Panels(fit, width).take(); }
+
+}  // namespace roxel

@@ -1,0 +1,28 @@
+#pragma once
+/// Pictures of how a sky was found: the sphere as the images show it, each mask, the fitted sky, its error.
+/// All directions from the zenith down to 30 degrees below the horizon; north in the middle, east to the
+/// right.
+
+#include <string>
+#include <vector>
+
+#include "roxel/image/image.h"
+#include "roxel/sky/sky_fit.h"
+
+namespace roxel {
+
+struct SkyPanel {
+  std::string name;     ///< of the file: "seen", "variance", "red_blue", "luminance", "used", "fit", "error"
+  std::string caption;  ///< for people
+  Image picture;        ///< display values
+};
+
+/// Error at which its picture is white.
+inline constexpr double kHottestSkyError = 0.25;
+
+/// Seven pictures of `width` columns. The masks' pictures show what each takes out: variance red, red over
+/// blue yellow, luminance green; "used" tints the facets of the fit blue. Error: black none, white a quarter
+/// and more, grey not used.
+std::vector<SkyPanel> sky_panels(const SkyFit& fit, int width = 480);
+
+}  // namespace roxel

@@ -1,0 +1,56 @@
+#pragma once
+/// From a node's pictures to its light: facets, masks, sun, model, and again with the facets that agree
+/// ([Jethwa04] ch. 3).
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "roxel/sky/node_sky.h"
+#include "roxel/sky/sky_masks.h"
+#include "roxel/sky/sky_picture.h"
+#include "roxel/sky/sphere_light.h"
+
+namespace roxel {
+
+struct SkyFitOptions {
+  int facet_level = 6;  ///< of the sphere, 4 to 8: 1.7 degrees at 6
+  SkyMaskOptions masks;
+  bool free_exponent = true;       ///< fit h, too; else it is 1
+  int residual_order = 0;          ///< of spherical functions on top of the model, 0 (none) to 4
+  int most_rounds = 8;             ///< fits, each with the facets that agree with the one before
+  std::optional<SunPosition> sun;  ///< by hand
+};
+
+/// One node: what is known of it apart from its pictures.
+struct SkyTask {
+  std::string name;
+  std::vector<std::string> views;  ///< one a picture
+  std::optional<double> time_utc_s, latitude_deg, longitude_deg;
+  Eigen::Matrix3d sky_from_world = Eigen::Matrix3d::Identity();
+};
+
+/// The picture of a view, by its place in SkyTask::views. May be asked for the same one twice.
+using SkyPictureSource = std::function<SkyPicture(int)>;
+
+/// The result, and how it came about.
+struct SkyFit {
+  NodeSky sky;
+  SphereLight light;
+  SkyMasks masks;
+  std::vector<std::uint8_t> used;  ///< facets of the last fit
+  int rounds = 0;
+  bool settled = false;  ///< the last round changed no facet
+  std::vector<std::string> warnings;
+};
+
+/// Never throws for what pictures show: what cannot be had is a named fallback (NodeSky::fallback).
+/// Deterministic.
+SkyFit fit_sky(const SkyTask& task, const SkyPictureSource& pictures, const SkyFitOptions& options);
+
+/// How surely each pixel shows the sky, 0 to 255: agreement with the model where the picture, pixel by pixel,
+/// hangs together with facets that the fit used. All 0 without a model.
+Mask soft_sky_mask(const SkyPicture& picture, const SkyFit& fit);
+
+}  // namespace roxel

@@ -1,0 +1,68 @@
+#pragma once
+/// A picture with the sky in it, and where its pixels look. The sky's frame: X east, Y north, Z up, where the
+/// data set says so; else Z up alone is known.
+
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
+#include <variant>
+
+#include "roxel/camera/camera.h"
+#include "roxel/image/image.h"
+
+namespace roxel {
+
+/// A panorama of all directions: row 0 is the zenith, the centre column north (+Y), to the right is east
+/// (+X); azimuth = (u / width - 1/2) 360 degrees, elevation = (1/2 - v / height) 180 degrees.
+struct Equirectangular {
+  int width = 0;
+  int height = 0;
+
+  Eigen::Vector3d direction(double u, double v) const;  ///< unit
+  Eigen::Vector2d position(const Eigen::Vector3d& direction) const;
+};
+
+/// Directions of a picture's pixels.
+class PixelRays {
+ public:
+  explicit PixelRays(const Equirectangular& panorama);
+  /// `sky_from_world` is a rotation.
+  PixelRays(const PinholeCamera& camera, const Eigen::Matrix3d& sky_from_world);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  /// Unit, in the sky's frame; (0.5, 0.5) is the top-left pixel's centre.
+  Eigen::Vector3d direction(double u, double v) const;
+  /// Where a direction is seen; none behind the camera. May lie outside the picture.
+  std::optional<Eigen::Vector2d> position(const Eigen::Vector3d& direction) const;
+  /// Steradians of pixel (x, y): exact, but for pinhole cameras with skew, where it is that of the centre
+  /// times the area.
+  double solid_angle(int x, int y) const;
+  /// Edge of a pixel in the middle of the picture, radians.
+  double pixel_angle() const;
+
+ private:
+  std::variant<Equirectangular, PinholeCamera> camera_;
+  Eigen::Matrix3d sky_from_camera_ = Eigen::Matrix3d::Identity();
+  int width_, height_;
+};
+
+struct SkyPicture {
+  Image rgb;            ///< linear
+  Mask valid = {};      ///< 0 where there is no data; empty = all valid
+  Mask known_sky = {};  ///< 255 where a person, or a volume, says that this is sky; empty = not known
+  PixelRays rays;
+  double clip = std::numeric_limits<double>::infinity();  ///< a channel of at least this is clipped
+};
+
+/// Where a picture clips: files whose values end at 1 do so just below 1; others at half float's end, or
+/// where several pixels share the highest value.
+double clip_level(const Image& rgb);
+
+/// Rec. 709 luminance of linear red, green, blue.
+template <class Rgb>
+double luminance(const Rgb& rgb) {
+  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
+
+}  // namespace roxel

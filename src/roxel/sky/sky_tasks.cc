@@ -1,0 +1,153 @@
+#include "roxel/sky/sky_tasks.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "roxel/base/error.h"
+#include "roxel/base/formatted.h"
+
+namespace roxel {
+namespace {
+
+constexpr double kSameSky_s = 900;
+
+/// The direction that cameras hold upright: cameras tilt, but they seldom roll, so it is the one that their
+/// rows of pixels are most at right angles to.
+Eigen::Vector3d camera_up(const std::vector<View>& views) {
+  Eigen::Matrix3d rows = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d upright = Eigen::Vector3d::Zero();
+  for (const View& view : views) {
+    const Eigen::Vector3d row = view.camera.pose.rotation.row(0).transpose();
+    rows += row * row.transpose();
+    upright -= view.camera.pose.rotation.row(1).transpose();
+  }
+  if (!(upright.norm() > 0)) return Eigen::Vector3d::UnitZ();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(rows);
+  // Views of one direction alone leave the angle open.
+  const bool clear = axes.eigenvalues()[1] > 0.02 * static_cast<double>(views.size());
+  const Eigen::Vector3d up =
+      clear ? Eigen::Vector3d(axes.eigenvectors().col(0)) : Eigen::Vector3d(upright.normalized());
+  return up.dot(upright) < 0 ? Eigen::Vector3d(-up) : up;
+}
+
+Eigen::Vector3d find_up(const Dataset& dataset, std::vector<std::string>& notes) {
+  const bool placed = std::any_of(dataset.views.begin(), dataset.views.end(),
+                                  [](const View& v) { return v.latitude_deg && v.longitude_deg; });
+  const Eigen::Vector3d cameras = camera_up(dataset.views);
+  if (placed || cameras.z() > 0.9) return Eigen::Vector3d::UnitZ();
+  int axis = 0;
+  cameras.cwiseAbs().maxCoeff(&axis);
+  const bool near_axis = std::abs(cameras[axis]) > 0.9;
+  const Eigen::Vector3d up =
+      near_axis ? Eigen::Vector3d(Eigen::Vector3d::Unit(axis) * (cameras[axis] > 0 ? 1 : -1)) : cameras;
+  notes.push_back(formatted("up is taken to be %.2f, %.2f, %.2f, which most cameras hold upright (--up)",
+                            up.x(), up.y(), up.z()));
+  return up;
+}
+
+std::string node_name(int number) { return formatted("n%02d", number); }
+
+std::optional<double> first_value(const Dataset& dataset, const std::vector<int>& view_idxs,
+                                  std::optional<double> View::*field) {
+  for (const int v : view_idxs)
+    if (dataset.views[v].*field) return dataset.views[v].*field;
+  return std::nullopt;
+}
+
+void check_one_time(const Dataset& dataset, const Node& node) {
+  const View* first = nullptr;
+  for (const int v : node.view_idxs) {
+    const View& view = dataset.views[v];
+    if (!view.time_utc_s) continue;
+    if (!first) first = &view;
+    if (std::abs(*view.time_utc_s - *first->time_utc_s) > kSameSky_s)
+      throw_invalid(view.source + ": node " + std::to_string(*view.node_id),
+                    formatted("a time %.0f minutes from that of %s, which has the same node",
+                              std::abs(*view.time_utc_s - *first->time_utc_s) / 60, first->source.c_str()),
+                    "one time a node (two nodes of the same name?)");
+  }
+}
+
+/// Views of one place, apart by time; without times all together.
+std::vector<std::vector<int>> split_by_time(const Dataset& dataset, const Node& node) {
+  std::vector<int> views = node.view_idxs;
+  const auto time = [&](int v) { return dataset.views[v].time_utc_s.value_or(0); };
+  std::stable_sort(views.begin(), views.end(), [&](int a, int b) { return time(a) < time(b); });
+  std::vector<std::vector<int>> groups;
+  for (const int v : views) {
+    if (groups.empty() || time(v) - time(groups.back().back()) > kSameSky_s) groups.emplace_back();
+    groups.back().push_back(v);
+  }
+  for (auto& group : groups) std::sort(group.begin(), group.end());
+  return groups;
+}
+
+struct Group {
+  std::optional<int> id;
+  std::vector<int> views;
+};
+
+std::vector<Group> group_views(const Dataset& dataset) {
+  std::vector<Group> groups;
+  std::map<double, std::size_t> by_time;  // of single views
+  for (const Node& node : dataset.nodes) {
+    const View& first = dataset.views[node.view_idxs.front()];
+    if (first.node_id) {
+      check_one_time(dataset, node);
+      groups.push_back({first.node_id, node.view_idxs});
+      continue;
+    }
+    for (const std::vector<int>& views : split_by_time(dataset, node)) {
+      const auto& time = dataset.views[views.front()].time_utc_s;
+      if (views.size() == 1 && time) {
+        const auto [known, is_new] = by_time.try_emplace(std::round(*time), groups.size());
+        if (!is_new) {
+          groups[known->second].views.push_back(views.front());
+          continue;
+        }
+      }
+      groups.push_back({std::nullopt, views});
+    }
+  }
+  return groups;
+}
+
+}  // namespace
+
+DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<double, 3>>& up) {
+  DatasetSkies skies;
+  const Eigen::Vector3d upwards =
+      up ? Eigen::Vector3d(Eigen::Vector3d((*up)[0], (*up)[1], (*up)[2]).normalized())
+         : find_up(dataset, skies.notes);
+  const Eigen::Matrix3d sky_from_world =
+      upwards == Eigen::Vector3d::UnitZ()
+          ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
+          : Eigen::Quaterniond::FromTwoVectors(upwards, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  int next = 0;
+  for (const Group& group : group_views(dataset)) next = std::max(next, group.id.value_or(-1) + 1);
+  for (Group& group : group_views(dataset)) {
+    SkyTask task;
+    task.name = node_name(group.id ? *group.id : next++);
+    for (const int v : group.views) task.views.push_back(dataset.views[v].name);
+    task.time_utc_s = first_value(dataset, group.views, &View::time_utc_s);
+    task.latitude_deg = first_value(dataset, group.views, &View::latitude_deg);
+    task.longitude_deg = first_value(dataset, group.views, &View::longitude_deg);
+    task.sky_from_world = sky_from_world;
+    skies.tasks.push_back(std::move(task));
+    skies.view_idxs.push_back(std::move(group.views));
+  }
+  return skies;
+}
+
+SkyPicture sky_picture(const View& view, Photograph photograph, const Eigen::Matrix3d& sky_from_world,
+                       Mask known_sky) {
+  SkyPicture picture{std::move(photograph.rgb), std::move(photograph.valid), std::move(known_sky),
+                     PixelRays(view.camera, sky_from_world)};
+  picture.clip = clip_level(picture.rgb);
+  return picture;
+}
+
+}  // namespace roxel

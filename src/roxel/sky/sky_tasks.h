@@ -1,0 +1,30 @@
+#pragma once
+/// Which photographs share one sky, and what the data set knows of it.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "roxel/dataset/dataset.h"
+#include "roxel/sky/sky_fit.h"
+
+namespace roxel {
+
+struct DatasetSkies {
+  std::vector<SkyTask> tasks;               ///< views by name; tasks have different names
+  std::vector<std::vector<int>> view_idxs;  ///< of each task, as SkyTask::views
+  std::vector<std::string> notes;           ///< what was taken for up, and the like
+};
+
+/// One sky a node. Nodes of a single view that share a time (to the second) share a sky; views of one place
+/// taken more than a quarter of an hour apart do not. Tasks are named by node id ("n03"), else by count.
+/// Without `up` (world, any length) it is +Z where places are given or cameras agree, else the axis that most
+/// cameras hold upright. Throws InvalidInput where one node id stands for two times: two nodes of one name.
+DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<double, 3>>& up = std::nullopt);
+
+/// The view's pixels; `known_sky` (255 = sky) or nothing.
+SkyPicture sky_picture(const View& view, Photograph photograph, const Eigen::Matrix3d& sky_from_world,
+                       Mask known_sky = {});
+
+}  // namespace roxel

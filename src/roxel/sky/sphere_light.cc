@@ -1,0 +1,102 @@
+#include "roxel/sky/sphere_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace roxel {
+
+SphereLightSum::SphereLightSum(std::shared_ptr<const FacetSphere> sphere)
+    : sphere_(std::move(sphere)), picture_(sphere_->count()), total_(sphere_->count()) {}
+
+void SphereLightSum::add(const SkyPicture& picture) {
+  // Pixels that are not small beside a facet are divided, so that each part goes to the right one.
+  const double facet_angle = std::sqrt(2 * sphere_->solid_angle(0));
+  const int samples =
+      std::clamp(static_cast<int>(std::ceil(3 * picture.rays.pixel_angle() / facet_angle)), 1, 16);
+  for (int y = 0; y < picture.rays.height(); ++y)
+    for (int x = 0; x < picture.rays.width(); ++x)
+      if (picture.valid.empty() || picture.valid.at(x, y) == 255) add_pixel(picture, x, y, samples);
+  fold();
+}
+
+void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y, int samples) {
+  const Eigen::Vector3d rgb = Eigen::Vector3f(picture.rgb.pixel(x, y)).cast<double>();
+  const double light = luminance(rgb), weight = picture.rays.solid_angle(x, y) / (samples * samples);
+  const bool clipped = rgb.maxCoeff() >= picture.clip;
+  const double known = picture.known_sky.empty() ? 0 : picture.known_sky.at(x, y) / 255.0;
+  for (int j = 0; j < samples; ++j)
+    for (int i = 0; i < samples; ++i) {
+      const Eigen::Vector3d d = picture.rays.direction(x + (i + 0.5) / samples, y + (j + 0.5) / samples);
+      if (!sphere_->contains(last_facet_, d)) last_facet_ = sphere_->facet_at(d);
+      Sum& sum = picture_[last_facet_];
+      if (sum.weight == 0 && sum.clipped == 0) touched_.push_back(last_facet_);
+      sum.peak = std::max(sum.peak, light);
+      sum.bright += light * weight * d;
+      sum.known_sky += known * weight;
+      if (clipped) {
+        sum.clipped += weight;
+        continue;
+      }
+      sum.weight += weight;
+      sum.first += weight * rgb;
+      sum.second += weight * rgb.cwiseProduct(rgb);
+      sum.luminance_second += weight * light * light;
+      ++sum.pixels;
+    }
+}
+
+void SphereLightSum::fold() {
+  for (const int f : touched_) {
+    const Sum& sum = picture_[f];
+    Total& total = total_[f];
+    total.weight += sum.weight;
+    total.clipped += sum.clipped;
+    total.known_sky += sum.known_sky;
+    total.pixels += sum.pixels;
+    total.first += sum.first;
+    total.second += sum.second;
+    total.luminance_second += sum.luminance_second;
+    total.peak = std::max(total.peak, sum.peak);
+    total.bright += sum.bright;
+    total.coverage =
+        std::max(total.coverage, std::min(1.0, (sum.weight + sum.clipped) / sphere_->solid_angle(f)));
+    ++total.pictures;
+    if (sum.weight > 0) {
+      const double mean = luminance(Eigen::Vector3d(sum.first / sum.weight));
+      total.between_weight += sum.weight;
+      total.between_first += sum.weight * mean;
+      total.between_second += sum.weight * mean * mean;
+    }
+    picture_[f] = {};
+  }
+  touched_.clear();
+}
+
+SphereLight SphereLightSum::result() const {
+  SphereLight light{sphere_, std::vector<FacetLight>(total_.size())};
+  for (std::size_t f = 0; f < total_.size(); ++f) {
+    const Total& total = total_[f];
+    FacetLight& facet = light.facets[f];
+    facet.weight = total.weight;
+    facet.clipped = total.clipped;
+    facet.known_sky = total.known_sky;
+    facet.coverage = total.coverage;
+    facet.pixels = total.pixels;
+    facet.pictures = total.pictures;
+    facet.peak = total.peak;
+    facet.bright = total.bright;
+    if (!(total.weight > 0)) continue;
+    facet.mean = total.first / total.weight;
+    facet.variance =
+        (total.second / total.weight - facet.mean.cwiseProduct(facet.mean)).cwiseMax(Eigen::Vector3d::Zero());
+    const double mean = luminance(facet.mean);
+    const auto relative = [&](double second) {
+      return mean > 0 ? std::sqrt(std::max(0.0, second - mean * mean)) / mean : 0.0;
+    };
+    facet.contrast = relative(total.luminance_second / total.weight);
+    facet.disagreement = relative(total.between_second / total.between_weight);
+  }
+  return light;
+}
+
+}  // namespace roxel

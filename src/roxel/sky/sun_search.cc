@@ -1,0 +1,132 @@
+#include "roxel/sky/sun_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace roxel {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kLeastContrast = 12;
+constexpr double kWidestPatchDeg = 7.5;  ///< radius
+constexpr double kClusterDeg = 3;
+constexpr double kLowestSunSine = -0.02;
+
+double median_luminance(const SphereLight& light) {
+  std::vector<double> values;
+  for (std::size_t f = 0; f < light.facets.size(); ++f)
+    if (light.facets[f].weight > 0 && light.sphere->centre(static_cast<int>(f)).z() > 0)
+      values.push_back(luminance(light.facets[f].mean));
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+bool is_clipped(const FacetLight& facet) { return facet.clipped > facet.weight; }
+
+/// The facets that hang together with `seed` and are clipped; `seen` remembers them.
+std::vector<int> clipped_patch(const SphereLight& light, int seed, std::vector<bool>& seen) {
+  std::vector<int> patch{seed};
+  seen[seed] = true;
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    for (const int next : light.sphere->neighbours(patch[i]))
+      if (!seen[next] && is_clipped(light.facets[next])) seen[next] = true, patch.push_back(next);
+  return patch;
+}
+
+FoundSun sun_of_patch(const SphereLight& light, const std::vector<int>& patch) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const int f : patch) middle += light.facets[f].bright;
+  FoundSun sun{middle.normalized(), 0, true, 0};
+  for (const int f : patch)
+    sun.radius_deg =
+        std::max(sun.radius_deg,
+                 std::acos(std::clamp(sun.direction.dot(light.sphere->centre(f)), -1.0, 1.0)) / kDegree);
+  return sun;
+}
+
+/// The largest clipped patch that is small enough to be the sun and its glare.
+std::optional<FoundSun> find_clipped_sun(const SphereLight& light) {
+  std::vector<bool> seen(light.facets.size());
+  std::optional<FoundSun> best;
+  std::size_t best_size = 0;
+  for (int f = 0; f < light.sphere->count(); ++f) {
+    if (seen[f] || !is_clipped(light.facets[f])) continue;
+    const std::vector<int> patch = clipped_patch(light, f, seen);
+    const FoundSun sun = sun_of_patch(light, patch);
+    if (sun.radius_deg > kWidestPatchDeg || sun.direction.z() < kLowestSunSine || patch.size() <= best_size)
+      continue;
+    best = sun, best_size = patch.size();
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<FoundSun> find_sun(const SphereLight& light) {
+  const double median = median_luminance(light);
+  int brightest = -1;
+  for (int f = 0; f < light.sphere->count(); ++f)
+    if (light.sphere->centre(f).z() > kLowestSunSine && light.facets[f].peak > 0 &&
+        (brightest < 0 || light.facets[f].peak > light.facets[brightest].peak))
+      brightest = f;
+  if (brightest < 0) return std::nullopt;
+  const double peak = light.facets[brightest].peak;
+  const double contrast = median > 0 ? peak / median : 0;
+  if (light.facets[brightest].clipped > 0) {
+    auto sun = find_clipped_sun(light);
+    if (sun) sun->contrast = contrast;
+    if (sun) return sun;
+  }
+  if (!(contrast >= kLeastContrast)) return std::nullopt;
+  // The facet's own middle of light first, then all light around it.
+  const Eigen::Vector3d start = light.facets[brightest].bright.normalized();
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (int f = 0; f < light.sphere->count(); ++f)
+    if (light.facets[f].peak > 0.05 * peak &&
+        light.sphere->centre(f).dot(start) > std::cos(kClusterDeg * kDegree))
+      middle += light.facets[f].bright;
+  return FoundSun{middle.normalized(), contrast, light.facets[brightest].clipped > 0, kClusterDeg};
+}
+
+SunMeasure measure_sun(const SkyPicture& picture, const Eigen::Vector3d& sun) {
+  SunMeasure measure;
+  const double radius = std::max(1.2 * kDegree, 4 * picture.rays.pixel_angle());
+  const auto at = picture.rays.position(sun);
+  const double reach = 2.5 * radius / picture.rays.pixel_angle() * 1.5;
+  if (!at || at->x() < 0 || at->y() < 0 || at->x() >= picture.rays.width() ||
+      at->y() >= picture.rays.height())
+    return measure;
+  const int x0 = std::max(0, static_cast<int>(at->x() - reach)),
+            y0 = std::max(0, static_cast<int>(at->y() - reach));
+  const int x1 = std::min(picture.rays.width(), static_cast<int>(at->x() + reach) + 1);
+  const int y1 = std::min(picture.rays.height(), static_cast<int>(at->y() + reach) + 1);
+  double inner = 0, ring = 0, peak = 0;
+  Eigen::Vector3d inner_light = Eigen::Vector3d::Zero(), ring_light = Eigen::Vector3d::Zero();
+  for (int y = y0; y < y1; ++y)
+    for (int x = x0; x < x1; ++x) {
+      const double angle =
+          std::acos(std::clamp(picture.rays.direction(x + 0.5, y + 0.5).dot(sun), -1.0, 1.0));
+      if (angle > 2 * radius) continue;
+      const Eigen::Vector3d rgb = Eigen::Vector3f(picture.rgb.pixel(x, y)).cast<double>();
+      const double weight = picture.rays.solid_angle(x, y);
+      if (angle < radius) {
+        if (rgb.maxCoeff() >= picture.clip) measure.clipped = true;
+        inner += weight, inner_light += weight * rgb, peak = std::max(peak, luminance(rgb));
+      } else {
+        ring += weight, ring_light += weight * rgb;
+      }
+    }
+  const double cap = 2 * std::numbers::pi * (1 - std::cos(radius)),
+               wide = 2 * std::numbers::pi * (1 - std::cos(2 * radius));
+  measure.in_view = inner > 0.95 * cap && ring > 0.9 * (wide - cap);
+  if (!measure.in_view) return measure;
+  const Eigen::Vector3d around = ring_light / ring;
+  measure.shines = peak > 20 * luminance(around) || measure.clipped;
+  if (measure.shines) measure.irradiance = (inner_light - inner * around).cwiseMax(Eigen::Vector3d::Zero());
+  return measure;
+}
+
+}  // namespace roxel
