@@ -1,5 +1,6 @@
 /// roxel sky: the light of every node, without a reconstruction.
 
+#include <array>
 #include <chrono>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -38,7 +39,7 @@ OptionTable<SkyCommandOptions> sky_table() {
   table.include(sky_option_table(), &SkyCommandOptions::sky);
   table.group("Sky files");
   table.add("pictures", &SkyCommandOptions::pictures)
-      .help("Write pictures of the sphere, masks, fit and error, too");
+      .help("Write pictures of the sphere, masks, fit and error, and a report, too");
   table.include(common_option_table(), &SkyCommandOptions::common);
   return table;
 }
@@ -48,6 +49,7 @@ struct NodeReport {
   ordered_json json;
   std::string line;
   std::vector<std::string> warnings;
+  ReportView view;
 };
 
 ordered_json triple(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
@@ -73,6 +75,32 @@ ordered_json masks_json(const SkyFit& fit) {
           {"reason", m.reason}};
 }
 
+/// Mean error of the fit over all smooth facets of the sky's masks or the fit, by where they are.
+ordered_json errors_json(const SkyFit& fit) {
+  struct Region {
+    const char* name;
+    double error = 0, area = 0;
+  };
+  std::array<Region, 5> regions{
+      {{"above_60"}, {"30_to_60"}, {"10_to_30"}, {"below_10"}, {"within_20_of_sun"}}};
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  for (int f = 0; f < fit.light.sphere->count() && fit.sky.has_light(); ++f) {
+    if (!fit.used[f] && !fit.masks.sky[f]) continue;
+    const Eigen::Vector3d& d = fit.light.sphere->centre(f);
+    const double area = fit.light.sphere->solid_angle(f), elevation = std::asin(d.z()) * kDegrees;
+    const double error =
+        (fit.sky.radiance_in_sky(d).array() / fit.light.facets[f].mean.array() - 1).abs().mean() * area;
+    const bool near_sun =
+        fit.sky.sun_source != SunSource::kNone && d.dot(fit.sky.sun) > std::cos(20 / kDegrees);
+    Region& region = regions[near_sun ? 4 : elevation > 60 ? 0 : elevation > 30 ? 1 : elevation > 10 ? 2 : 3];
+    region.error += error, region.area += area;
+  }
+  ordered_json json;
+  for (const Region& region : regions)
+    json[region.name] = region.area > 0 ? ordered_json(region.error / region.area) : ordered_json(nullptr);
+  return json;
+}
+
 ordered_json node_json(const SkyFit& fit, double mask_share) {
   const NodeSky& s = fit.sky;
   const SkyLight light(s);
@@ -81,6 +109,7 @@ ordered_json node_json(const SkyFit& fit, double mask_share) {
           {"model", to_string(s.model)},
           {"fallback", s.fallback},
           {"mean_error", s.mean_error},
+          {"error_by_region", errors_json(fit)},
           {"relative_sigma", triple(s.relative_sigma)},
           {"facets_used", std::count(fit.used.begin(), fit.used.end(), 1)},
           {"sky_share", s.sky_share},
@@ -117,7 +146,7 @@ std::string node_line(const SkyFit& fit) {
   return line + "\n";
 }
 
-void write_pictures(const fs::path& run, const SkyFit& fit) {
+ReportView write_pictures(const fs::path& run, const SkyFit& fit) {
   const std::vector<SkyPanel> panels = sky_panels(fit);
   std::vector<std::vector<Image>> sheet;
   for (std::size_t i = 0; i < panels.size(); ++i) {
@@ -127,6 +156,7 @@ void write_pictures(const fs::path& run, const SkyFit& fit) {
     sheet.back().push_back(panels[i].picture);
   }
   write_png(sky_path(run, fit.sky.name, ".png").string(), contact_sheet(sheet), kAsItIs);
+  return sky_report(fit, panels);
 }
 
 /// A mask by hand stands; the others come from the fit. Returns the share of pixels that are sky.
@@ -147,8 +177,8 @@ NodeReport do_node(const SkyTask& task, const SkyPictureSource& pictures, const 
   const SkyFit fit = fit_sky(task, pictures, options.sky.fit_options());
   write_sky(run, fit.sky);
   const double mask_share = write_masks(run, fit, pictures);
-  if (options.pictures) write_pictures(run, fit);
-  NodeReport report{node_json(fit, mask_share), node_line(fit), {}};
+  NodeReport report{node_json(fit, mask_share), node_line(fit), {}, {}};
+  if (options.pictures) report.view = write_pictures(run, fit);
   for (const std::string& warning : fit.warnings) report.warnings.push_back(task.name + ": " + warning);
   return report;
 }
@@ -194,6 +224,12 @@ ordered_json summary_json(const Invocation& invocation, const SkyInput& input, c
       {"warnings", warnings}};
 }
 
+std::string report_page(const ordered_json& summary, const std::vector<NodeReport>& reports) {
+  ReportContent content{summary};
+  for (const int n : report_views(static_cast<int>(reports.size()))) content.skies.push_back(reports[n].view);
+  return html_report(content);
+}
+
 /// A folder of this command's results may be written anew, one of a reconstruction may not.
 void check_output(const fs::path& run) {
   if (fs::exists(run / "volume.vdb"))
@@ -204,6 +240,7 @@ void remove_older(const fs::path& run) {
   std::error_code ignored;
   if (!fs::is_regular_file(run / "summary.json")) return;
   fs::remove(run / "summary.json", ignored);
+  fs::remove(run / "report.html", ignored);
   if (!fs::is_symlink(run / "sky")) fs::remove_all(run / "sky", ignored);
 }
 
@@ -229,6 +266,7 @@ int run_sky(const Invocation& invocation, const SkyCommandOptions& options) {
   const ordered_json summary =
       summary_json(invocation, input, ordered_json(sky_table().to_json(options)), reports, seconds);
   write_text_atomically(partial.path() / "summary.json", json_text(summary));
+  if (options.pictures) write_text_atomically(partial.path() / "report.html", report_page(summary, reports));
   partial.publish([&] { remove_older(folder.path()); });
   session.display().clear();
   for (const auto& warning : summary["warnings"]) warn(options.common, warning.get<std::string>());

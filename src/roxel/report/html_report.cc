@@ -139,6 +139,7 @@ class Page {
     inputs();
     measures();
     views();
+    skies();
     sections();
     convergence();
     cost();
@@ -322,7 +323,11 @@ class Page {
       out_ +=
           " Depth error: white is none, blue four voxels too near, red too far; black is missed or too much.";
     out_ += "</p>\n";
-    for (const ReportView& view : content_.views) {
+    picture_rows(content_.views);
+  }
+
+  void picture_rows(const std::vector<ReportView>& views) {
+    for (const ReportView& view : views) {
       out_ += "<div class=\"view\"><h3>" + escape_markup(view.name) + (view.figures.empty() ? "" : ": ") +
               escape_markup(view.figures) + "</h3><div class=\"row" +
               (view.pictures.size() == 5 ? " five" : "") + "\">\n";
@@ -332,6 +337,25 @@ class Page {
                 escape_markup(picture.caption) + "</figcaption></figure>\n";
       out_ += "</div></div>\n";
     }
+  }
+
+  void skies() {
+    if (content_.skies.empty()) return;
+    heading("Sky");
+    out_ +=
+        "<p>All directions down to 30 degrees below the horizon, north in the middle, east to the right. "
+        "Masks show what "
+        "they take out. Error of the fit: black is none, white a quarter and more, grey not used.</p>\n";
+    std::vector<std::vector<std::string>> rows{{"node", "model", "error", "of the dome",
+                                                "sun (azimuth, elevation)", "from", "its light", "fallback"}};
+    const ordered_json& list = at(summary_, "skies");
+    for (const auto& sky : list.is_array() ? list : ordered_json::array())
+      rows.push_back({text_of(at(sky, "node")), text_of(at(sky, "model")),
+                      percent(number(sky, "mean_error"), 2), percent(number(sky, "sky_share")),
+                      text_of(at(sky, "sun")), text_of(at(sky, "sun_source")), text_of(at(sky, "sun_light")),
+                      text_of(at(sky, "fallback"))});
+    if (rows.size() > 1) out_ += table(rows);
+    picture_rows(content_.skies);
   }
 
   void sections() {
@@ -368,8 +392,9 @@ class Page {
       row(text_of(at(stage, "name")), number(stage, "seconds"));
     row("all", total);
     out_ += table(rows);
-    out_ += formatted("<p>%.0f threads; peak memory %.0f MiB.</p>\n", number(summary_, "threads"),
-                      number(summary_, "peak_memory_bytes") / 1024 / 1024);
+    if (at(summary_, "peak_memory_bytes").is_number())
+      out_ += formatted("<p>%.0f threads; peak memory %.0f MiB.</p>\n", number(summary_, "threads"),
+                        number(summary_, "peak_memory_bytes") / 1024 / 1024);
   }
 
   void settings() {

@@ -27,6 +27,7 @@ struct ReportContent {
   std::vector<Section> sections = {};
   std::vector<float> opacities = {};      ///< of the box's voxels
   const RunMeasures* measures = nullptr;  ///< against the truth; null: not measured
+  std::vector<ReportView> skies = {};     ///< of nodes: sphere, masks, fit, error
 };
 
 /// Everything from outside is escaped; nothing is fetched from anywhere, and there are no scripts.

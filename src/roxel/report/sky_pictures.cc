@@ -113,4 +113,10 @@ class Panels {
 
 std::vector<SkyPanel> sky_panels(const SkyFit& fit, int width) { return Panels(fit, width).take(); }
 
+ReportView sky_report(const SkyFit& fit, const std::vector<SkyPanel>& panels) {
+  ReportView view{fit.sky.name, fit.masks.reason};
+  for (const SkyPanel& panel : panels) view.pictures.push_back(report_picture(panel.caption, panel.picture));
+  return view;
+}
+
 }  // namespace roxel

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "roxel/image/image.h"
+#include "roxel/report/html_report.h"
 #include "roxel/sky/sky_fit.h"
 
 namespace roxel {
@@ -24,5 +25,8 @@ inline constexpr double kHottestSkyError = 0.25;
 /// blue yellow, luminance green; "used" tints the facets of the fit blue. Error: black none, white a quarter
 /// and more, grey not used.
 std::vector<SkyPanel> sky_panels(const SkyFit& fit, int width = 480);
+
+/// Those pictures for the page, with the reason for the choice of masks.
+ReportView sky_report(const SkyFit& fit, const std::vector<SkyPanel>& panels);
 
 }  // namespace roxel

@@ -1,0 +1,100 @@
+#include "roxel/sky/sky_tasks.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include "roxel/base/error.h"
+
+namespace roxel {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+View view(const std::string& name, const Eigen::Vector3d& centre, std::optional<double> time = {},
+          std::optional<int> node = {}) {
+  View v;
+  v.name = name;
+  v.source = "frames of " + name;
+  v.camera.pose.centre = centre;
+  // Upright, looking north: x east, y down.
+  v.camera.pose.rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  v.time_utc_s = time;
+  v.node_id = node;
+  return v;
+}
+
+Dataset dataset(std::vector<View> views) {
+  Dataset d;
+  d.views = std::move(views);
+  assign_nodes(d);
+  return d;
+}
+
+std::vector<std::string> names(const DatasetSkies& skies) {
+  std::vector<std::string> out;
+  for (const SkyTask& task : skies.tasks) out.push_back(task.name);
+  return out;
+}
+
+TEST(SkyTasks, OneANodeByItsId) {
+  const DatasetSkies skies = sky_tasks(dataset({view("a", {0, 0, 0}, 100, 3), view("b", {0, 0, 0}, 160, 3), view("c", {5, 0, 0}, 9000, 7)}));
+  EXPECT_THAT(names(skies), ElementsAre("n03", "n07"));
+  EXPECT_THAT(skies.tasks[0].views, ElementsAre("a", "b"));
+  EXPECT_EQ(*skies.tasks[1].time_utc_s, 9000);
+}
+
+TEST(SkyTasks, SingleImagesOfOneTimeShareASky) {
+  const DatasetSkies skies = sky_tasks(dataset({view("a", {0, 0, 0}, 500), view("b", {3, 0, 0}, 500), view("c", {6, 0, 0}, 900)}));
+  EXPECT_THAT(names(skies), ElementsAre("n00", "n01"));
+  EXPECT_THAT(skies.tasks[0].views, ElementsAre("a", "b"));
+}
+
+TEST(SkyTasks, OnePlaceAtTwoHoursHasTwoSkies) {
+  const DatasetSkies skies =
+      sky_tasks(dataset({view("a", {0, 0, 0}, 0), view("b", {0, 0, 0}, 60), view("c", {0, 0, 0}, 7200), view("d", {9, 0, 0}, 1)}));
+  ASSERT_EQ(skies.tasks.size(), 3u);
+  EXPECT_THAT(skies.tasks[0].views, ElementsAre("a", "b"));
+  EXPECT_THAT(skies.tasks[1].views, ElementsAre("c"));
+}
+
+TEST(SkyTasks, TwoNodesOfOneNameAreAnErrorThatNamesTheFrames) {
+  try {
+    sky_tasks(dataset({view("a", {0, 0, 0}, 0, 2), view("b", {9, 0, 0}, 7200, 2)}));
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr("frames of b: node 2: found a time 120 minutes from that of frames of a"));
+  }
+}
+
+TEST(SkyTasks, UpIsWhereCamerasHoldItThoughTheyTilt) {
+  // A world with up = -Y; cameras look around and tilt up by 40 degrees.
+  std::vector<View> views;
+  const Eigen::Matrix3d world = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  for (int i = 0; i < 6; ++i) {
+    View v = view("v" + std::to_string(i), {double(i), 0, 0});
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.5 * i, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    v.camera.pose.rotation = tilt * v.camera.pose.rotation * turn * world;
+    views.push_back(v);
+  }
+  const DatasetSkies skies = sky_tasks(dataset(views));
+  const Eigen::Vector3d up = skies.tasks[0].sky_from_world.transpose() * Eigen::Vector3d::UnitZ();
+  EXPECT_LT((up - world.transpose() * Eigen::Vector3d::UnitZ()).norm(), 1e-6);
+  ASSERT_EQ(skies.notes.size(), 1u);
+  EXPECT_THAT(skies.notes[0], HasSubstr("--up"));
+}
+
+TEST(SkyTasks, UpByHandComesFirstAndPlacesMeanZ) {
+  std::vector<View> views{view("a", {0, 0, 0})};
+  const DatasetSkies given = sky_tasks(dataset(views), std::array<double, 3>{0, 2, 0});
+  EXPECT_LT((given.tasks[0].sky_from_world * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  views[0].camera.pose.rotation = Eigen::Matrix3d::Identity();  // looks up
+  views[0].latitude_deg = 48, views[0].longitude_deg = 11;
+  EXPECT_TRUE(sky_tasks(dataset(views)).tasks[0].sky_from_world.isIdentity());
+}
+
+}  // namespace
+}  // namespace roxel

@@ -1,0 +1,241 @@
+#!/usr/bin/env python3
+"""Tests of `roxel sky`, through the program itself, on small panoramas and data sets made here.
+
+    sky_test.py ROXEL [unittest arguments, e.g. Sky]
+"""
+
+import json
+import math
+import os
+import pathlib
+import sys
+import unittest
+
+import cli_test
+from cli_test import digest, files_below
+
+WIDTH, HEIGHT = 128, 64
+
+
+def rgbe(rgb):
+    """A pixel of a Radiance file."""
+    top = max(rgb)
+    if top < 1e-32: return bytes(4)
+    mantissa, exponent = math.frexp(top)
+    scale = mantissa * 256 / top
+    return bytes([min(255, int(c * scale)) for c in rgb] + [exponent + 128])
+
+
+def direction(x, y):
+    azimuth, elevation = ((x + 0.5) / WIDTH - 0.5) * 2 * math.pi, (0.5 - (y + 0.5) / HEIGHT) * math.pi
+    return (math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation))
+
+
+def clear_sky(x, y, sun=(0.5, -0.6, 0.6245)):
+    """A blue sky over a wall with texture; the sun is one pixel."""
+    d = direction(x, y)
+    if d[2] < 0.15: return [0.3 * (1 + 0.5 * ((x * 7 + y * 13) % 5 - 2) / 2) * c for c in (1, 0.9, 0.7)]
+    cosine = sum(a * b for a, b in zip(d, sun))
+    if cosine > math.cos(math.radians(1.6)): return [900, 800, 700]
+    phi = math.acos(min(1, cosine))
+    bright = (1 - 0.98 * math.exp(-0.3 / d[2])) * (1 + 9 * math.exp(-3 * phi) + 0.5 * cosine * cosine)
+    return [bright * c for c in (0.08, 0.11, 0.17)]
+
+
+def panorama(path, sky=clear_sky):
+    with open(path, "wb") as out:
+        out.write(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (HEIGHT, WIDTH))
+        out.write(b"".join(rgbe(sky(x, y)) for y in range(HEIGHT) for x in range(WIDTH)))
+    return path
+
+
+# What every option changes, beside what is common: options, and what of the result.
+CHANGES = {
+    "contrast-limit": ["--contrast-limit", "0.005"],
+    "exponent": ["--no-exponent"],
+    "facets": ["--facets", "4"],
+    "lowest-elevation": ["--lowest-elevation", "40"],
+    "red-blue-limit": ["--red-blue-limit", "0.3"],
+    "residual": ["--residual", "2"],
+    "response": ["--response", "gamma:1.2"],
+    "sky-rounds": ["--sky-rounds", "1"],
+    "sun": ["--sun", "10,20"],
+}
+ELSEWHERE = {"format", "images", "nodes", "up", "sky-masks", "pictures", "threads", "quiet", "verbose", "json", "config", "help"}
+
+
+class SkyCase(cli_test.Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.panorama = panorama(cls.folder / "square.hdr")
+
+    def sky(self, name, *arguments, data=None):
+        out = self.folder / name
+        done = self.succeed("sky", data or self.panorama, "-o", out, *arguments, "--json", "--quiet")
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertEqual(json.loads(done.stdout), summary)
+        return out, summary
+
+    def frames(self, name, change=lambda frames: None, **top):
+        """The demo's data set again with other keys."""
+        data = json.loads((self.data / "transforms.json").read_text())
+        data.update(top)
+        for frame in data["frames"]: frame["file_path"] = str(self.data / frame["file_path"])
+        change(data["frames"])
+        path = self.folder / (name + ".json")
+        path.write_text(json.dumps(data))
+        return path
+
+
+class Panoramas(SkyCase):
+    def test_a_clear_sky_is_found_with_its_sun(self):
+        out, summary = self.sky("clear")
+        node = summary["skies"][0]
+        self.assertEqual((node["node"], node["model"], node["sun_source"], node["sun_light"]),
+                         ("square", "perez", "images", "measured"))
+        self.assertLess(node["mean_error"], 0.03)
+        self.assertAlmostEqual(node["sun"][0], math.degrees(math.atan2(0.5, -0.6)), delta=2)
+        self.assertAlmostEqual(node["sun"][1], math.degrees(math.asin(0.6245)), delta=2)
+        self.assertEqual(node["masks"]["red_blue"], "used")
+        below = files_below(out)
+        for name in ("summary.json", "sky/square.json", "sky/square.exr", "sky/square_nosun.exr", "sky/square.png",
+                     "sky/square_variance.png", "sky/square_error.png", "sky/mask/square.png", "report.html"):
+            self.assertIn(name, below)
+
+    def test_threads_change_nothing(self):
+        one, _ = self.sky("one", "--threads", "1", data=self.data)
+        two, _ = self.sky("two", "--threads", "2", data=self.data)
+        below = lambda out: {f: digest(out / f) for f in files_below(out) if f.startswith("sky/")}
+        self.assertGreater(len(below(one)), 4)
+        self.assertEqual(below(one), below(two))
+
+    def test_pictures_can_be_left_out(self):
+        out, _ = self.sky("bare", "--no-pictures")
+        self.assertEqual([f for f in files_below(out) if f.endswith(".png")], ["sky/mask/square.png"])
+
+    def test_a_second_run_replaces_the_first_and_nothing_else(self):
+        out, _ = self.sky("again", "--facets", "4")
+        (out / "mine.txt").write_text("keep")
+        self.sky("again", "--no-pictures", "--facets", "4")
+        self.assertNotIn("sky/square.png", files_below(out))
+        self.assertIn("mine.txt", files_below(out))
+
+
+class SkyOptions(SkyCase):
+    def test_every_option_changes_something(self):
+        numbers = lambda summary: [summary["skies"][0][k] for k in ("relative_sigma", "facets_used", "sun", "horizontal_irradiance", "rounds")]
+        _, plain = self.sky("plain", "--no-pictures")
+        self.assertEqual(set(plain["options"]), (set(CHANGES) | ELSEWHERE) - {"config", "help"})
+        for option, change in CHANGES.items():
+            with self.subTest(option):
+                _, changed = self.sky("changed", "--no-pictures", *change)
+                self.assertNotEqual(numbers(plain), numbers(changed))
+
+    def test_every_option_is_in_help_and_in_the_docs(self):
+        text = self.succeed("sky", "--help").stdout
+        docs = (cli_test.SOURCE / "docs/commands.md").read_text() + (cli_test.SOURCE / "docs/options.md").read_text()
+        for option in set(CHANGES) | ELSEWHERE:
+            self.assertRegex(text, rf"--(no-)?{option}\b")
+            self.assertRegex(docs, rf"--(no-)?{option}\b")
+
+    def test_masks_by_hand_decide_and_stand(self):
+        first, _ = self.sky("first")
+        masks = self.folder / "by-hand"
+        masks.mkdir()
+        (masks / "square.png").write_bytes((first / "sky/mask/square.png").read_bytes())
+        out, summary = self.sky("by-hand-run", "--sky-masks", masks)
+        self.assertEqual(summary["skies"][0]["masks"]["reason"], "masks by hand say what is sky")
+        self.assertEqual(digest(out / "sky/mask/square.png"), digest(masks / "square.png"))
+
+    def test_images_nodes_and_format_choose_views(self):
+        _, all_views = self.sky("all", "--no-pictures", "--facets", "4", data=self.data)
+        _, some = self.sky("some", "--no-pictures", "--facets", "4", "--images", "00[01]*", data=self.data)
+        _, one = self.sky("one-node", "--no-pictures", "--facets", "4", "--nodes", "1:2", data=self.data)
+        _, colmap = self.sky("colmap", "--no-pictures", "--facets", "4", "--format", "colmap", data=self.data)
+        self.assertEqual([len(s["skies"]) for s in (all_views, some, one)], [4, 2, 1])
+        self.assertEqual(colmap["dataset"]["format"], "colmap")
+
+    def test_up_turns_the_sky(self):
+        turns = [self.sky("up", "--no-pictures", "--facets", "4", "--up", up, data=self.data)[0] for up in ("0,0,1", "0,1,0")]
+        json_of = lambda: json.loads((self.folder / "up/sky/n00.json").read_text())["sky_from_world"]
+        self.assertEqual(len(turns), 2)
+        self.assertAlmostEqual(json_of()[2][1], 1)
+
+
+class SkyInput(SkyCase):
+    def test_bad_input_ends_with_code_2(self):
+        square = self.folder / "flat.hdr"
+        square.write_bytes(self.panorama.read_bytes().replace(b"-Y 64 +X 128", b"-Y 128 +X 64"))
+        empty = self.folder / "empty"
+        empty.mkdir()
+        run, _ = self.reconstruct("run")
+
+        def node_twice(frames):
+            for frame, hour in zip(frames, (9, 15, 9, 9)): frame.update(node=1, time_utc=f"2003-08-21T{hour:02}:00:00Z")
+
+        def no_zone(frames): frames[2]["time_utc"] = "2003-08-21T09:00:00"
+
+        out = self.folder / "never"
+        for message, arguments in [
+            ("flat.hdr: found 64 x 128 pixels, expected a panorama", [square]),
+            ("nothing-here", [self.folder / "nothing-here"]),
+            ("a reconstruction, expected another folder", [self.panorama, "-o", run]),
+            ("--sky-masks", [self.panorama, "--sky-masks", self.folder / "nothing"]),
+            ("no mask of any image", [self.panorama, "--sky-masks", empty]),
+            ("from -90 to 90", [self.panorama, "--sun", "10,95"]),
+            ("--sun: found", [self.panorama, "--sun", "10"]),
+            ("up must not be 0,0,0", [self.panorama, "--up", "0,0,0"]),
+            ("--facets: found", [self.panorama, "--facets", "9"]),
+            ("node 1: found a time 360 minutes from that of", [self.frames("twice", node_twice)]),
+            ("frames[2].time_utc", [self.frames("no-zone", no_zone)]),
+            ("latitude: found 91", [self.frames("latitude", latitude=91, longitude=0)]),
+        ]:
+            with self.subTest(message):
+                given = [str(a) for a in arguments]
+                self.expect_error(2, message, "sky", *given, *([] if "-o" in given else ["-o", out]))
+                self.assertFalse(out.exists())
+
+    def test_what_cannot_be_had_is_a_named_fallback(self):
+        grey = lambda x, y: [0.05 + 0.03 * ((x * 7 + y * 13) % 5)] * 3
+        white = lambda x, y: [1.0] * 3 if direction(x, y)[2] > 0.1 else grey(x, y)
+        cases = {"no sky in view": panorama(self.folder / "room.hdr", grey), "clipped": panorama(self.folder / "white.hdr", white)}
+        for name, path in cases.items():
+            with self.subTest(name):
+                _, summary = self.sky("fallback", "--facets", "4", data=path)
+                self.assertEqual((summary["skies"][0]["model"], summary["skies"][0]["fallback"]), ("none", name))
+
+        def night(frames):
+            for frame in frames: frame.update(node=1, time_utc="2003-08-21T04:50:00Z", latitude=42.36, longitude=-71.09)
+
+        _, summary = self.sky("night", data=self.frames("night", night))
+        self.assertEqual([(s["model"], s["fallback"], s["images"]) for s in summary["skies"]], [("none", "night", 4)])
+
+
+class SkyMeasures(SkyCase):
+    def test_eval_measures_the_skies_of_a_street(self):
+        data, out = self.folder / "street", self.folder / "street-sky"
+        self.succeed("synth", "street", "-o", data, "--images", "20", "--size", "48x36", "--samples", "1", "--quiet")
+        self.sky("street-sky", "--facets", "4", "--no-pictures", data=data)
+        measured = json.loads(self.succeed("eval", out, "--truth", data, "--json").stdout)["skies"]
+        self.assertEqual([m["node"] for m in measured], ["n00"])
+        self.assertLess(measured[0]["sun_error_deg"], 0.1)
+        self.assertEqual(measured[0]["masks"], 20)
+        self.assertGreater(measured[0]["mask_iou"], 0.5)
+        self.assertLess(measured[0]["oracle_error"], 0.3)
+        self.succeed("eval", out, "--truth", data, "-o", self.folder / "figures")
+        self.assertEqual(files_below(self.folder / "figures"), ["metrics.json", "skies.csv"])
+        self.assertEqual(len((self.folder / "figures/skies.csv").read_text().splitlines()), 2)
+        self.expect_error(2, "illumination.json", "eval", out, "--truth", self.data)
+
+
+def main():
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    cli_test.ROXEL = os.path.abspath(sys.argv.pop(1))
+    cli_test.SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+    unittest.main(argv=[sys.argv[0], *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()
