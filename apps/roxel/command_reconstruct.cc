@@ -11,6 +11,7 @@
 #include "roxel/base/parallel.h"
 #include "roxel/eval/volume_accuracy.h"
 #include "roxel/io/voxels_ply.h"
+#include "sky_stage.h"
 #include "view_writer.h"
 
 namespace roxel::cli {
@@ -21,6 +22,7 @@ constexpr double kVolumeWritten = 0.88;
 
 struct StageSwitches {
   std::optional<std::string> init;
+  std::optional<std::string> sky;
   bool dry_run = false;
   bool depth = true;
   bool render = true;
@@ -42,6 +44,10 @@ OptionTable<StageSwitches> stage_table() {
       .help("Start from the volume of this run instead of from nothing")
       .placeholder("RUN")
       .unset("none");
+  table.add("sky", &StageSwitches::sky)
+      .help("Take the skies and sky masks of this run, of roxel sky or roxel reconstruct")
+      .placeholder("RUN")
+      .unset("fitted anew for --illumination sky, else none");
   table.add("dry-run", &StageSwitches::dry_run)
       .help("Say what would be done, and what memory and time it would take");
   table.add("depth", &StageSwitches::depth).help("Depth maps: depth/NAME.exr and .png");
@@ -134,13 +140,16 @@ class Run {
     protect_sources(invocation_.output, sources());
     const OutputFolder folder(invocation_.output);
     for (const std::string& warning : input_.dataset.warnings) warn(options_.common, warning);
+    if (std::filesystem::exists(folder.path() / "summary.json")) partial_.emplace(folder.path());
+    const std::filesystem::path& results = partial_ ? partial_->path() : folder.path();
     hashes_ = hash_images(input_.dataset, session_.context());
     stopwatch_.lap();
+    find_daylight(results);
     make_volume(initial ? &initial->volume : nullptr);
     if (initial && initial->info.exposure != made_.scene.exposure)
       warn(options_.common,
            "--init: that run has another exposure, so its colours are brighter or darker than here");
-    write_results(folder.path());
+    write_results(folder.path(), results);
     return 0;
   }
 
@@ -149,6 +158,7 @@ class Run {
     Sources read;
     read.dataset = &input_.dataset;
     if (options_.stages.init) read.folders.push_back(*options_.stages.init);
+    if (options_.stages.sky) read.folders.push_back(*options_.stages.sky);
     return read;
   }
 
@@ -159,32 +169,47 @@ class Run {
     return 0;
   }
 
+  /// The skies, where they are given or asked for; from then on the photographs come with sky masks.
+  void find_daylight(const std::filesystem::path& results) {
+    const IlluminationChoice choice = options_.reconstruct.illumination;
+    std::filesystem::path skies = options_.stages.sky.value_or("");
+    if (skies.empty() && choice == IlluminationChoice::kSky) {
+      const SkyInput input = read_sky_input(invocation_.inputs.front(), options_.input, {}, session_);
+      skies_ = fit_skies(input, {}, results, session_, input_.dataset.warnings);
+      made_.summary.stages.push_back({"sky", stopwatch_.lap()});
+      skies = results;
+    }
+    if (skies.empty()) return;
+    daylight_ = read_daylight(skies, input_.dataset);
+    if (daylight_->masks) input_.load = with_sky_masks(input_.load, skies);
+  }
+
   void make_volume(const Volume* initial) {
     ReconstructHooks hooks;
     hooks.initial = initial;
+    if (daylight_) hooks.daylight = &*daylight_;
     hooks.after_survey = [&](const Scene& scene) {
       for (const std::string& warning : scene.warnings) warn(options_.common, warning);
     };
     hooks.after_pass = [&](const PassRecord& record) {
       session_.display().line(pass_text(record, options_.reconstruct));
     };
+    std::vector<StageRecord> before = std::move(made_.summary.stages);
     made_ = reconstruct(input_.dataset, input_.load, options_.reconstruct, session_.context(), hooks,
                         kVolumeShare);
+    made_.summary.stages.insert(made_.summary.stages.begin(), before.begin(), before.end());
     stopwatch_.lap();
   }
 
   /// A finished run is replaced as a whole; where there is none, what is written stays even if a later stage
   /// fails, since others can go on from a volume.
-  void write_results(const std::filesystem::path& folder) {
-    std::optional<PartialResults> partial;
-    if (std::filesystem::exists(folder / "summary.json")) partial.emplace(folder);
-    const std::filesystem::path& results = partial ? partial->path() : folder;
+  void write_results(const std::filesystem::path& folder, const std::filesystem::path& results) {
     write_volume_files(results);
     write_views(results);
     session_.context().throw_if_cancelled();
     if (options_.stages.report) write_report(results);
     const std::string json = write_summary(results);
-    if (partial) partial->publish([&] { remove_results(folder); });
+    if (partial_) partial_->publish([&] { remove_results(folder); });
     say_results(json);
   }
 
@@ -263,6 +288,7 @@ class Run {
     record.scene = made_.scene;
     record.frame = made_.volume.index(0).frame();
     record.summary = made_.summary;
+    record.skies = skies_;
     record.warnings = input_.dataset.warnings;
     record.warnings.insert(record.warnings.end(), made_.scene.warnings.begin(), made_.scene.warnings.end());
     record.views = views_;
@@ -297,6 +323,9 @@ class Run {
   Input input_;
   std::vector<std::string> hashes_;
   Stopwatch stopwatch_;
+  std::optional<PartialResults> partial_;
+  std::optional<Daylight> daylight_;
+  std::vector<nlohmann::ordered_json> skies_;
   Reconstruction made_;
   std::vector<ViewFigures> views_;
   std::vector<ReportView> report_views_;

@@ -16,7 +16,7 @@
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
 #include "roxel/report/sky_pictures.h"
-#include "sky_input.h"
+#include "sky_stage.h"
 
 namespace roxel::cli {
 namespace {
@@ -275,6 +275,18 @@ int run_sky(const Invocation& invocation, const SkyCommandOptions& options) {
 }
 
 }  // namespace
+
+std::vector<ordered_json> fit_skies(const SkyInput& input, const SkyOptions& sky, const fs::path& run,
+                                    Session& session, std::vector<std::string>& warnings) {
+  SkyCommandOptions options;
+  options.sky = sky;
+  std::vector<ordered_json> nodes;
+  for (NodeReport& report : do_nodes(input, options, run, session)) {
+    nodes.push_back(std::move(report.json));
+    for (std::string& warning : report.warnings) warnings.push_back(std::move(warning));
+  }
+  return nodes;
+}
 
 void add_sky(Commands& commands) {
   CommandForm form{"sky", "Find the daylight of each node: sky, sun and sky masks", "DATASET", "RUN"};

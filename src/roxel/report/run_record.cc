@@ -44,6 +44,18 @@ ordered_json background_json(const Scene& scene) {
   return background;
 }
 
+const char* light_name(LightSource from) {
+  switch (from) {
+    case LightSource::kNone:
+      return "none";
+    case LightSource::kGain:
+      return "gain";
+    case LightSource::kSky:
+      return "sky";
+  }
+  return "";
+}
+
 ordered_json scene_json(const RunRecord& record) {
   const Scene& scene = record.scene;
   const Eigen::Vector3d low = scene.bounds.box.min(), high = scene.bounds.box.max();
@@ -59,7 +71,7 @@ ordered_json scene_json(const RunRecord& record) {
           {"white_point", to_string(scene.transform.white())},
           {"exposure", scene.exposure},
           {"light",
-           {{"illumination", scene.light.fits_gains ? "gain" : "none"},
+           {{"illumination", light_name(scene.light.from)},
             {"matching", scene.light.local_matching ? "local" : "canonical"},
             {"matching_blur_deg", scene.light.blur_deg}}},
           {"background", background_json(scene)}};
@@ -124,7 +136,7 @@ ordered_json list(const std::vector<T>& items, ToJson to) {
 
 ordered_json to_json(const RunRecord& record) {
   const Summary& summary = record.summary;
-  return {{"format", kSummaryFormat},
+  ordered_json json{{"format", kSummaryFormat},
           {"version", ROXEL_VERSION},
           {"command", record.command_line},
           {"dataset",
@@ -150,6 +162,8 @@ ordered_json to_json(const RunRecord& record) {
           {"notes", summary.notes},
           {"warnings", record.warnings},
           {"views", views_json(record)}};
+  if (!record.skies.empty()) json["skies"] = record.skies;
+  return json;
 }
 
 void add_to_hash(const View& view, const std::string& file_hash, std::string& combined) {
@@ -212,6 +226,7 @@ void remove_results(const fs::path& run) {
   fs::remove(run / "summary.json", ignored);
   for (const char* name : {"volume.vdb", "voxels.ply", "overview.png", "report.html"})
     fs::remove(run / name, ignored);
+  if (!fs::is_symlink(run / "sky")) fs::remove_all(run / "sky", ignored);
   for (const json& view : summary.value("views", json::array())) {
     const std::string name = view.value("name", "");
     if (name.empty()) continue;

@@ -40,6 +40,7 @@ struct RunRecord {
   LatticeFrame frame;  ///< of the box
   Summary summary;
   std::vector<std::string> warnings;
+  std::vector<nlohmann::ordered_json> skies;  ///< as roxel sky reports them, where they were fitted
   std::vector<ViewFigures> views;
   std::optional<double> reprojection_rms;  ///< percent, over all views together
 };

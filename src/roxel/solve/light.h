@@ -9,13 +9,20 @@
 
 namespace roxel {
 
-enum class IlluminationChoice { kAuto, kNone, kGain };
+enum class IlluminationChoice { kAuto, kNone, kGain, kSky };
 enum class Matching { kAuto, kCanonical, kLocal };
+
+/// Where a view's light comes from.
+enum class LightSource {
+  kNone,  ///< it counts as 1
+  kGain,  ///< it follows the volume from pass to pass
+  kSky,   ///< it is that of the dome
+};
 
 /// A photograph's radiance is canonical colour times exposure times the view's light, per channel.
 struct Light {
   std::vector<std::array<float, 3>> of_views;  ///< one a view; empty: 1 for all
-  bool fits_gains = false;                     ///< `of_views` follows the volume from pass to pass
+  LightSource from = LightSource::kNone;
   bool local_matching = false;                 ///< colours are compared without their neighbourhood's light
   double blur_deg = 5;                         ///< standard deviation of that neighbourhood
 

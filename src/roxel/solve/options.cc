@@ -122,8 +122,11 @@ void add_light(OptionTable<Options>& table) {
       .add("illumination", &Options::illumination,
            {{"auto", IlluminationChoice::kAuto},
             {"none", IlluminationChoice::kNone},
-            {"gain", IlluminationChoice::kGain}})
-      .help("Light that is divided out of the photographs: none, or one gain an image and channel")
+            {"gain", IlluminationChoice::kGain},
+            {"sky", IlluminationChoice::kSky}})
+      .help(
+          "Light that is divided out of the photographs: none, one gain an image and channel, or the light "
+          "of each node's sky; auto: sky where --sky is given, else none")
       .source("[Jethwa04] section 7.2.3; docs/light.md");
   table
       .add("matching", &Options::matching,

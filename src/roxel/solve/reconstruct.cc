@@ -163,7 +163,8 @@ class LevelPasses {
                                          last ? nullptr : &acceleration, volume, summary);
       const bool rests = record.mean_opacity_change < options_.tolerance;
       if (last) return resting || rests;
-      if (scene.light.fits_gains) fit_light(pass, samples, scene, volume, summary);
+      if (scene.light.from == LightSource::kGain && !light_rests_)
+        fit_light(pass, samples, scene, volume, summary);
       if (options_.all_passes || !rests) continue;
       resting = !draft;
       draft_passes = std::min(draft_passes, pass);  // drafts say no more: on to the samples themselves
@@ -189,12 +190,13 @@ class LevelPasses {
     return summary.passes.back();
   }
 
-  void fit_light(int pass, LevelSamples& samples, Scene& scene, Volume& volume, Summary& summary) const {
+  void fit_light(int pass, LevelSamples& samples, Scene& scene, Volume& volume, Summary& summary) {
     if (scene.light.local_matching) samples.paint(scene, volume);
     LightRecord record;
     record.level = level_;
     record.pass = pass;
-    if (samples.fit_light(volume, scene, record)) samples.make(scene);
+    light_rests_ = !samples.fit_light(volume, scene, record);
+    if (!light_rests_) samples.make(scene);
     summary.light.push_back(record);
   }
 
@@ -204,6 +206,7 @@ class LevelPasses {
   const RunContext& context_;
   LevelProgress& progress_;
   const ReconstructHooks& hooks_;
+  bool light_rests_ = false;
 };
 
 }  // namespace
@@ -257,7 +260,7 @@ Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
   const auto start = Clock::now();
   Reconstruction result;
   Summary& summary = result.summary;
-  result.scene = survey(dataset, load, options, context);
+  result.scene = survey(dataset, load, options, context, hooks.daylight);
   summary.notes = dataset.notes;
   summary.notes.insert(summary.notes.end(), result.scene.notes.begin(), result.scene.notes.end());
   if (hooks.after_survey) hooks.after_survey(result.scene);

@@ -21,6 +21,8 @@ struct ReconstructHooks {
   std::function<void(const Volume&, const Scene&, const Summary&)> after_level;
   /// Opacities and colours to start from (--init), as a volume of any resolution in the same colour space.
   const Volume* initial = nullptr;
+  /// The skies over the photographs, where they are known.
+  const Daylight* daylight = nullptr;
 };
 
 /// Throws InvalidInput for bad input or options, Cancelled when the context was cancelled. `context` gets

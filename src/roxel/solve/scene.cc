@@ -92,6 +92,26 @@ Image sample_image(const Dataset& dataset, int view_idx, const Photograph& photo
   return samples;
 }
 
+/// Skies that are known count unless options say otherwise; then the light changes, and colours are compared
+/// without it.
+void choose_light(const Daylight* daylight, const ReconstructOptions& options, Scene& scene) {
+  Light& light = scene.light;
+  const IlluminationChoice choice = options.illumination;
+  if (choice == IlluminationChoice::kSky || (choice == IlluminationChoice::kAuto && daylight)) {
+    if (daylight) light.of_views = light_of_views(*daylight);
+    if (light.of_views.empty() && choice == IlluminationChoice::kSky)
+      throw_invalid("--illumination sky", "no photograph whose sky is known",
+                    "photographs that show the sky, or --illumination gain");
+  }
+  light.from = !light.of_views.empty()               ? LightSource::kSky
+               : choice == IlluminationChoice::kGain ? LightSource::kGain
+                                                     : LightSource::kNone;
+  light.local_matching = options.matching == Matching::kLocal ||
+                         (options.matching == Matching::kAuto && light.from == LightSource::kSky);
+  if (light.from == LightSource::kSky) scene.notes.push_back("light: that of each view's sky is divided out");
+  if (light.local_matching) scene.notes.push_back("matching: without the light of the neighbourhood");
+}
+
 /// Every level's lattice is that of the coarsest, divided: with many levels its bricks reach far out of the
 /// box.
 void check_levels(const Scene& scene, const ReconstructOptions& options) {
@@ -135,8 +155,6 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
   scene.notes.push_back("bounds: " + scene.bounds.how);
   scene.transform =
       ColorTransform(options.color_space, parse_white_point(options.white_point, "--white-point"));
-  scene.light.fits_gains = options.illumination == IlluminationChoice::kGain;
-  scene.light.local_matching = options.matching == Matching::kLocal;
   scene.light.blur_deg = options.matching_blur;
   scene.model = make_model(options);
   scene.background.unknown_likelihood = static_cast<float>(
@@ -145,7 +163,7 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
 }
 
 Scene survey(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
-             const RunContext& context) {
+             const RunContext& context, const Daylight* daylight) {
   Scene scene = lay_out(dataset, load, options);
   std::vector<std::vector<float>> luminances(dataset.views.size());
   std::vector<BorderSample> borders(dataset.views.size());
@@ -158,9 +176,13 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
   std::vector<float> all;
   for (const auto& part : luminances) all.insert(all.end(), part.begin(), part.end());
   scene.exposure = choose_exposure(std::move(all), scene.notes);
+  choose_light(daylight, options, scene);
   choose_background(borders, options, scene);
-  const bool ends_unknown =
-      scene.background.kind == BackgroundKind::kUnknown || scene.background.kind == BackgroundKind::kNone;
+  // A mask of the sky says nothing of rays that leave the box and do not end in the sky; a box with cameras
+  // in it is the whole of what they see.
+  const bool ends_unknown = scene.background.kind == BackgroundKind::kUnknown ||
+                            scene.background.kind == BackgroundKind::kNone ||
+                            (daylight && daylight->masks && !scene.seen_from_inside);
   const bool surround =
       options.surround == SurroundChoice::kOn || (options.surround == SurroundChoice::kAuto && ends_unknown);
   scene.surround_count = surround ? count_surround(dataset, scene.bounds) : 0;

@@ -3,6 +3,7 @@
 
 #include "roxel/base/run_context.h"
 #include "roxel/dataset/bounds.h"
+#include "roxel/solve/daylight.h"
 #include "roxel/solve/options.h"
 
 namespace roxel {
@@ -21,9 +22,10 @@ struct Scene {
   std::vector<std::string> warnings;  ///< what is likely to be a mistake, and what to change
 };
 
-/// Reads every image once. Throws InvalidInput for options that do not fit the data set.
+/// Reads every image once. `daylight` where it is known, else null. Throws InvalidInput for options that do
+/// not fit the data set.
 Scene survey(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
-             const RunContext& context);
+             const RunContext& context, const Daylight* daylight = nullptr);
 
 /// The box, far distances and voxel size alone: no image is read (masks are, where they tighten the box and
 /// `load` is given). For `roxel info` and dry runs, and the first step of survey().
