@@ -44,6 +44,7 @@ results: setup
 	cmake --build --preset $(PRESET) -j $(JOBS) --target roxel agreement_figures
 	build/$(PRESET)/benchmarks/quality/agreement_figures docs/results
 	benchmarks/quality/tables.py --roxel build/$(PRESET)/apps/roxel/roxel
+	benchmarks/quality/sky_table.py --roxel build/$(PRESET)/apps/roxel/roxel
 
 format:
 	tools/setup.sh dev

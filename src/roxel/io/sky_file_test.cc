@@ -91,11 +91,13 @@ TEST_F(SkyFile, BadFilesAreNamedWithFieldFoundAndExpected) {
   const std::vector<std::tuple<std::string, json, std::string>> table{
       {"/format", "other", "format: found \"other\", expected \"roxel sky\""},
       {"/version", 2, "version: found 2, expected a whole number from 1 to 1"},
-      {"/model", "cloudy", "model: found \"cloudy\", expected one of none, uniform, published, gradation, perez"},
+      {"/model", "cloudy",
+       "model: found \"cloudy\", expected one of none, uniform, published, gradation, perez"},
       {"/red/a", nullptr, "red: a: found null, expected a finite number"},
       {"/green/residual", json::array({1}), "green: residual: found [1], expected 4 numbers"},
       {"/residual_order", 9, "residual_order: found 9, expected a whole number from 0 to 4"},
-      {"/sun/direction", json::array({1, 1, 0}), "sun: direction: found [1,1,0], expected a vector of length 1"},
+      {"/sun/direction", json::array({1, 1, 0}),
+       "sun: direction: found [1,1,0], expected a vector of length 1"},
       {"/sun/light", "some", "sun: light: found \"some\", expected one of none, measured, estimated"},
       {"/sky_from_world/0", json::array({1, 1, 0}), "sky_from_world: found"},
       {"/views", json::array({3}), "views: found 3, expected names of views"},
@@ -145,8 +147,12 @@ TEST(SkyMaskPath, StaysInTheRun) {
 
 TEST_F(SkyFile, TruthIsReadAndBadTruthNamed) {
   fs::create_directories(run_);
-  json node{{"node", 3}, {"sun_direction", {0, 0, 1}}, {"sun_disc", true}, {"equirect_without_disc", "sky/a.exr"},
-            {"sun_irradiance_normal_rgb", {1, 2, 3}}, {"total_irradiance_horizontal_rgb", {1, 2, 3}},
+  json node{{"node", 3},
+            {"sun_direction", {0, 0, 1}},
+            {"sun_disc", true},
+            {"equirect_without_disc", "sky/a.exr"},
+            {"sun_irradiance_normal_rgb", {1, 2, 3}},
+            {"total_irradiance_horizontal_rgb", {1, 2, 3}},
             {"sky_irradiance_horizontal_rgb", {0.1, 0.2, 0.3}}};
   const auto write = [&] { std::ofstream(run_ / "illumination.json") << json{{"nodes", {node}}}; };
   write();

@@ -24,6 +24,9 @@ enum class SkyModel {
 };
 const char* to_string(SkyModel model);
 
+/// NodeSky::fallback of a sky that is white all over.
+inline constexpr const char* kClippedSky = "clipped";
+
 /// Where the sun's direction comes from.
 enum class SunSource { kNone, kTime, kImages, kGiven };
 const char* to_string(SunSource source);

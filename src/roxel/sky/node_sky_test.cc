@@ -23,7 +23,8 @@ TEST(SkyLight, OfAUniformSkyIsPiTimesItsRadiance) {
   const SkyLight light(uniform_sky());
   for (int c = 0; c < 3; ++c) {
     EXPECT_NEAR(light.horizontal_irradiance(Disc::kWith)[c], kPi * (0.5 + c), kQuadrature * 9);
-    EXPECT_NEAR(light.irradiance(Eigen::Vector3d::UnitX(), Disc::kWith)[c], kPi * (0.5 + c) / 2, kQuadrature * 9);
+    EXPECT_NEAR(light.irradiance(Eigen::Vector3d::UnitX(), Disc::kWith)[c], kPi * (0.5 + c) / 2,
+                kQuadrature * 9);
     EXPECT_NEAR(light.irradiance(-Eigen::Vector3d::UnitZ(), Disc::kWith)[c], 0, kQuadrature);
     EXPECT_NEAR(light.canonical_light()[c], 0.5 + c, kQuadrature * 3);
     EXPECT_NEAR(light.mean_radiance()[c], 0.5 + c, 1e-9);
@@ -40,7 +41,8 @@ TEST(SkyLight, OfCiesOvercastSkyIsSevenNinthsOfItsZenith) {
 TEST(SkyLight, TheDiscAddsItsCosine) {
   const NodeSky sky = clear_sky(90, 30);
   const SkyLight light(sky);
-  const Eigen::Vector3d up = light.horizontal_irradiance(Disc::kWith) - light.horizontal_irradiance(Disc::kWithout);
+  const Eigen::Vector3d up =
+      light.horizontal_irradiance(Disc::kWith) - light.horizontal_irradiance(Disc::kWithout);
   EXPECT_LT((up - 0.5 * sky.sun_irradiance).norm(), 1e-9);
   const Eigen::Vector3d west(-1, 0, 0), east(1, 0, 0);
   EXPECT_LT((light.irradiance(west, Disc::kWith) - light.irradiance(west, Disc::kWithout)).norm(), 1e-12);
@@ -59,7 +61,8 @@ TEST(NodeSky, TurnsWithItsFrame) {
   NodeSky sky = clear_sky();
   const Eigen::Vector3d d = Eigen::Vector3d(0.3, -0.5, 0.6).normalized();
   const Eigen::Vector3d before = sky.radiance(d), lit = SkyLight(sky).irradiance(d, Disc::kWith);
-  const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
   sky.sky_from_world = turn;
   EXPECT_LT((sky.radiance(turn.transpose() * d) - before).norm(), 1e-9);
   EXPECT_LT((SkyLight(sky).irradiance(turn.transpose() * d, Disc::kWith) - lit).norm(), 1e-9);

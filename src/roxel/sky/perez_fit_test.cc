@@ -27,7 +27,8 @@ std::vector<SkySample> samples_of(const PerezChannel& channel, const Eigen::Vect
 double mean_difference(const PerezChannel& a, const PerezChannel& b, const Eigen::Vector3d& sun) {
   double sum = 0;
   for (const Eigen::Vector3d& d : dome())
-    sum += std::abs(a.scale * perez_relative(a.shape, d, sun) / (b.scale * perez_relative(b.shape, d, sun)) - 1);
+    sum +=
+        std::abs(a.scale * perez_relative(a.shape, d, sun) / (b.scale * perez_relative(b.shape, d, sun)) - 1);
   return sum / static_cast<double>(dome().size());
 }
 
@@ -35,11 +36,14 @@ TEST(PerezFit, RecoversKnownSkiesFromNoisySamplesOver100Seeds) {
   // Noise of 2 %, one sample in twelve a wall: the fit over 256 samples is good to a third of the noise.
   for (int seed = 0; seed < 100; ++seed) {
     std::mt19937 random(seed);
-    const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<>(low, high)(random); };
+    const auto uniform = [&](double low, double high) {
+      return std::uniform_real_distribution<>(low, high)(random);
+    };
     const Eigen::Vector3d sun = sun_direction({uniform(0, 360), uniform(15, 70)});
     const PerezChannel truth =
         seed % 4 == 0 ? PerezChannel{{uniform(1, 4), uniform(-1, -0.5), 0, -1, 0, 1}, uniform(0.01, 10)}
-                      : PerezChannel{{uniform(-1.02, -0.8), uniform(-0.6, -0.15), uniform(2, 25), uniform(-5, -2.5), uniform(0.1, 1), 1},
+                      : PerezChannel{{uniform(-1.02, -0.8), uniform(-0.6, -0.15), uniform(2, 25),
+                                      uniform(-5, -2.5), uniform(0.1, 1), 1},
                                      uniform(0.01, 10)};
     std::vector<SkySample> samples = samples_of(truth, sun);
     std::normal_distribution<> normal(0, 0.02);
@@ -123,7 +127,8 @@ TEST(PerezFit, APriorSaysWhatNoSampleSays) {
   std::vector<SkySample> samples;
   for (const Eigen::Vector3d& d : dome(30))
     samples.push_back({d, Eigen::Vector3d::Constant(perez_relative(truth.shape, d, sun) *
-                                                    (1 + 0.03 * unrest(static_cast<int>(1000 * d.x()), static_cast<int>(1000 * d.y()))))});
+                                                    (1 + 0.03 * unrest(static_cast<int>(1000 * d.x()),
+                                                                       static_cast<int>(1000 * d.y()))))});
   PerezFitOptions options;
   options.starts = published_starts(sun);
   const double without = mean_difference(fit_perez(samples, 0, sun, options).channel, truth, sun);
@@ -134,7 +139,8 @@ TEST(PerezFit, APriorSaysWhatNoSampleSays) {
 
 TEST(PerezFit, WithoutSamplesOrStartsIsAnError) {
   PerezFitOptions options;
-  EXPECT_THROW(fit_perez(samples_of({{}, 1}, Eigen::Vector3d::UnitZ()), 0, Eigen::Vector3d::UnitZ(), options), std::logic_error);
+  EXPECT_THROW(fit_perez(samples_of({{}, 1}, Eigen::Vector3d::UnitZ()), 0, Eigen::Vector3d::UnitZ(), options),
+               std::logic_error);
   options.starts = {PerezShape{}};
   EXPECT_THROW(fit_perez({}, 0, Eigen::Vector3d::UnitZ(), options), std::logic_error);
 }

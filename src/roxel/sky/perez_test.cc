@@ -49,7 +49,8 @@ TEST(PerezRelative, StaysFiniteAtTheHorizonAndInTheSun) {
 
 TEST(PerezRelative, DerivativesAreThoseOfCentralDifferences) {
   using Jet = ceres::Jet<double, 6>;
-  const double shapes[3][6] = {{-0.9, -0.3, 7, -2, 0.4, 1.3}, {4, -0.7, 0.1, -1, 0.05, 1}, {-1.1, -0.6, 14, -5, 1, 0.7}};
+  const double shapes[3][6] = {
+      {-0.9, -0.3, 7, -2, 0.4, 1.3}, {4, -0.7, 0.1, -1, 0.05, 1}, {-1.1, -0.6, 14, -5, 1, 0.7}};
   for (const auto& shape : shapes)
     for (const double cos_theta : {0.05, 0.4, 0.95})
       for (const double phi : {0.1, 1.2, 2.8}) {
@@ -61,7 +62,8 @@ TEST(PerezRelative, DerivativesAreThoseOfCentralDifferences) {
           std::copy_n(shape, 6, low), std::copy_n(shape, 6, high);
           const double step = 1e-6;
           low[i] -= step, high[i] += step;
-          const double difference = (perez_relative(high, cos_theta, phi) - perez_relative(low, cos_theta, phi)) / (2 * step);
+          const double difference =
+              (perez_relative(high, cos_theta, phi) - perez_relative(low, cos_theta, phi)) / (2 * step);
           EXPECT_NEAR(value.v[i], difference, 1e-7 * (1 + std::abs(difference))) << "parameter " << i;
         }
       }

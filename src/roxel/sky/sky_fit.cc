@@ -18,6 +18,7 @@ constexpr double kLeastShare = 0.0005;   ///< of the hemisphere, for any model
 constexpr double kShareForShape = 0.03;  ///< of the hemisphere, for free parameters
 /// Of log radiance: no model fits better everywhere, and none is good near the horizon and the sun.
 constexpr double kAgreeSigmas = 3, kAlwaysAgrees = 0.12, kAtHorizon = 0.5, kHorizonDeg = 6;
+constexpr double kAgreesWithOneColor = 0.35;  ///< real skies have a gradient
 constexpr double kAtSun = 0.5, kSunDeg = 10;
 constexpr double kPriorStrength = 2e-5;  ///< as much as a relative error of 0.7 % at one prior deviation
 /// Regions apart from the sky's (gaps, arches) must be about as bright and of that colour: windows are
@@ -149,7 +150,7 @@ class Fitting {
     }
     const double share = share_used();
     if (share < kLeastShare) {
-      sky().fallback = share_clipped() > kLeastShare ? "clipped" : "no sky in view";
+      sky().fallback = share_clipped() > kLeastShare ? kClippedSky : "no sky in view";
       return SkyModel::kNone;
     }
     if (share < kShareForShape) {
@@ -245,7 +246,8 @@ class Fitting {
   bool agrees(int f) const {
     const Eigen::Array3d error = log_ratio(sphere_->centre(f), out_.light.facets[f].mean).array().abs();
     const double elevation = std::asin(sphere_->centre(f).z()) / kDegree;
-    const double always = kAlwaysAgrees + kAtHorizon * std::exp(-elevation / kHorizonDeg) +
+    const double anywhere = out_.sky.model == SkyModel::kUniform ? kAgreesWithOneColor : kAlwaysAgrees;
+    const double always = anywhere + kAtHorizon * std::exp(-elevation / kHorizonDeg) +
                           kAtSun * std::exp(-angle_deg(sphere_->centre(f), out_.sky.sun) / kSunDeg);
     return (error < (kAgreeSigmas * out_.sky.relative_sigma.array()).max(always)).all();
   }

@@ -50,7 +50,8 @@ struct SkyFit {
 SkyFit fit_sky(const SkyTask& task, const SkyPictureSource& pictures, const SkyFitOptions& options);
 
 /// How surely each pixel shows the sky, 0 to 255: agreement with the model where the picture, pixel by pixel,
-/// hangs together with facets that the fit used. All 0 without a model.
+/// hangs together with facets that the fit used. Where the sky is clipped, what clips; all 0 without a model
+/// otherwise.
 Mask soft_sky_mask(const SkyPicture& picture, const SkyFit& fit);
 
 }  // namespace roxel

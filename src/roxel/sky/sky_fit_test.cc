@@ -13,7 +13,10 @@ double dome_difference(const NodeSky& ours, const NodeSky& truth) {
   int count = 0;
   for (int f = 0; f < sphere.count(); ++f) {
     if (sphere.centre(f).z() < 0.05) continue;
-    sum += (ours.radiance_in_sky(sphere.centre(f)).array() / truth.radiance_in_sky(sphere.centre(f)).array() - 1).abs().mean();
+    sum +=
+        (ours.radiance_in_sky(sphere.centre(f)).array() / truth.radiance_in_sky(sphere.centre(f)).array() - 1)
+            .abs()
+            .mean();
     ++count;
   }
   return sum / count;
@@ -102,7 +105,8 @@ TEST(FitSky, WarnsWhereTimeAndImagesDisagreeOnTheSun) {
   EXPECT_EQ(wrong.sky.sun_source, SunSource::kTime);
   ASSERT_TRUE(wrong.sky.sun_by_images && wrong.sky.sun_by_time);
   const SunPosition sun = sun_position(*noon().time_utc_s, *noon().latitude_deg, *noon().longitude_deg);
-  EXPECT_TRUE(fit_one(panorama_of(clear_sky(sun.azimuth_deg, sun.elevation_deg), {}), {}, noon()).warnings.empty());
+  EXPECT_TRUE(
+      fit_one(panorama_of(clear_sky(sun.azimuth_deg, sun.elevation_deg), {}), {}, noon()).warnings.empty());
 }
 
 TEST(FitSky, ASunByHandComesFirst) {
@@ -165,6 +169,9 @@ TEST(FitSky, ASkyThatClipsHasAName) {
   const SkyFit fit = fit_one(picture, {}, noon());
   EXPECT_EQ(fit.sky.model, SkyModel::kNone);
   EXPECT_EQ(fit.sky.fallback, "clipped");
+  const Mask mask = soft_sky_mask(picture, fit);
+  EXPECT_EQ(mask.at(100, 20), 255);
+  EXPECT_EQ(mask.at(100, 120), 0) << "below the horizon";
 }
 
 TEST(FitSky, AnUnknownSunLeavesGradation) {
@@ -185,7 +192,8 @@ SkyPicture narrow_picture(const NodeSky& sky) {
   SkyPicture picture{Image(120, 90, 3), {}, {}, PixelRays(camera, Eigen::Matrix3d::Identity())};
   for (int y = 0; y < 90; ++y)
     for (int x = 0; x < 120; ++x) {
-      const Eigen::Vector3f seen = sky.radiance_in_sky(picture.rays.direction(x + 0.5, y + 0.5)).cast<float>();
+      const Eigen::Vector3f seen =
+          sky.radiance_in_sky(picture.rays.direction(x + 0.5, y + 0.5)).cast<float>();
       std::copy_n(seen.data(), 3, picture.rgb.pixel(x, y));
     }
   for (int y = 60; y < 90; ++y)

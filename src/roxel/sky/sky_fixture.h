@@ -15,7 +15,8 @@ inline NodeSky clear_sky(double sun_azimuth = 150, double sun_elevation = 40) {
   sky.model = SkyModel::kPerez;
   sky.sun = sun_direction({sun_azimuth, sun_elevation});
   sky.sun_source = SunSource::kGiven;
-  sky.channels = {PerezChannel{{-1.01, -0.15, 25, -5, 0.9, 1}, 0.15}, PerezChannel{{-1.02, -0.23, 14, -5, 0.95, 1}, 0.14},
+  sky.channels = {PerezChannel{{-1.01, -0.15, 25, -5, 0.9, 1}, 0.15},
+                  PerezChannel{{-1.02, -0.23, 14, -5, 0.95, 1}, 0.14},
                   PerezChannel{{-1.06, -0.45, 6, -5, 1, 1}, 0.13}};
   sky.sun_light = SunLight::kMeasured;
   sky.sun_irradiance = {3.3, 2.7, 2.2};
@@ -38,17 +39,18 @@ inline float unrest(int x, int y) {
 }
 
 struct Square {
-  double roof_deg = 15;         ///< height of the walls around, above the horizon
-  float wall = 0.3f;            ///< mean radiance; texture changes it by a half
-  bool window = false;          ///< a smooth patch in the southern wall that mirrors a tenth of the sky
+  double roof_deg = 15;  ///< height of the walls around, above the horizon
+  float wall = 0.3f;     ///< mean radiance; texture changes it by a half
+  bool window = false;   ///< a smooth patch in the southern wall that mirrors a tenth of the sky
   bool disc = true;
-  float noise = 0;              ///< relative, of the sky
+  float noise = 0;  ///< relative, of the sky
 };
 
 /// The wall's `surface` is 255 in the picture's true mask.
 inline SkyPicture panorama_of(const NodeSky& sky, const Square& square, Mask* surface = nullptr) {
   const Equirectangular frame{360, 180};
-  SkyPicture picture{sky_map(sky, square.disc ? Disc::kWith : Disc::kWithout, 360, 180), {}, {}, PixelRays(frame)};
+  SkyPicture picture{
+      sky_map(sky, square.disc ? Disc::kWith : Disc::kWithout, 360, 180), {}, {}, PixelRays(frame)};
   if (surface) *surface = Mask(360, 180, 0);
   for (int y = 0; y < 180; ++y)
     for (int x = 0; x < 360; ++x) {
@@ -73,7 +75,8 @@ inline SkyFit fit_one(const SkyPicture& picture, SkyFitOptions options = {}, Sky
   options.facet_level = std::min(options.facet_level, 5);
   task.name = "n00";
   task.views = {"a"};
-  return fit_sky(task, [&](int) { return picture; }, options);
+  return fit_sky(
+      task, [&](int) { return picture; }, options);
 }
 
 }  // namespace roxel

@@ -40,21 +40,23 @@ std::vector<std::string> names(const DatasetSkies& skies) {
 }
 
 TEST(SkyTasks, OneANodeByItsId) {
-  const DatasetSkies skies = sky_tasks(dataset({view("a", {0, 0, 0}, 100, 3), view("b", {0, 0, 0}, 160, 3), view("c", {5, 0, 0}, 9000, 7)}));
+  const DatasetSkies skies = sky_tasks(
+      dataset({view("a", {0, 0, 0}, 100, 3), view("b", {0, 0, 0}, 160, 3), view("c", {5, 0, 0}, 9000, 7)}));
   EXPECT_THAT(names(skies), ElementsAre("n03", "n07"));
   EXPECT_THAT(skies.tasks[0].views, ElementsAre("a", "b"));
   EXPECT_EQ(*skies.tasks[1].time_utc_s, 9000);
 }
 
 TEST(SkyTasks, SingleImagesOfOneTimeShareASky) {
-  const DatasetSkies skies = sky_tasks(dataset({view("a", {0, 0, 0}, 500), view("b", {3, 0, 0}, 500), view("c", {6, 0, 0}, 900)}));
+  const DatasetSkies skies =
+      sky_tasks(dataset({view("a", {0, 0, 0}, 500), view("b", {3, 0, 0}, 500), view("c", {6, 0, 0}, 900)}));
   EXPECT_THAT(names(skies), ElementsAre("n00", "n01"));
   EXPECT_THAT(skies.tasks[0].views, ElementsAre("a", "b"));
 }
 
 TEST(SkyTasks, OnePlaceAtTwoHoursHasTwoSkies) {
-  const DatasetSkies skies =
-      sky_tasks(dataset({view("a", {0, 0, 0}, 0), view("b", {0, 0, 0}, 60), view("c", {0, 0, 0}, 7200), view("d", {9, 0, 0}, 1)}));
+  const DatasetSkies skies = sky_tasks(dataset({view("a", {0, 0, 0}, 0), view("b", {0, 0, 0}, 60),
+                                                view("c", {0, 0, 0}, 7200), view("d", {9, 0, 0}, 1)}));
   ASSERT_EQ(skies.tasks.size(), 3u);
   EXPECT_THAT(skies.tasks[0].views, ElementsAre("a", "b"));
   EXPECT_THAT(skies.tasks[1].views, ElementsAre("c"));
@@ -65,7 +67,8 @@ TEST(SkyTasks, TwoNodesOfOneNameAreAnErrorThatNamesTheFrames) {
     sky_tasks(dataset({view("a", {0, 0, 0}, 0, 2), view("b", {9, 0, 0}, 7200, 2)}));
     FAIL();
   } catch (const InvalidInput& error) {
-    EXPECT_THAT(error.what(), HasSubstr("frames of b: node 2: found a time 120 minutes from that of frames of a"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("frames of b: node 2: found a time 120 minutes from that of frames of a"));
   }
 }
 
@@ -90,7 +93,8 @@ TEST(SkyTasks, UpIsWhereCamerasHoldItThoughTheyTilt) {
 TEST(SkyTasks, UpByHandComesFirstAndPlacesMeanZ) {
   std::vector<View> views{view("a", {0, 0, 0})};
   const DatasetSkies given = sky_tasks(dataset(views), std::array<double, 3>{0, 2, 0});
-  EXPECT_LT((given.tasks[0].sky_from_world * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((given.tasks[0].sky_from_world * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitZ()).norm(),
+            1e-12);
   views[0].camera.pose.rotation = Eigen::Matrix3d::Identity();  // looks up
   views[0].latitude_deg = 48, views[0].longitude_deg = 11;
   EXPECT_TRUE(sky_tasks(dataset(views)).tasks[0].sky_from_world.isIdentity());

@@ -126,9 +126,24 @@ class PixelMasking {
   std::vector<std::uint8_t> reached_;
 };
 
+/// Where nothing of the sky is left to fit: what clips in facets that clip for the most part.
+Mask clipped_mask(const SkyPicture& picture, const SkyFit& fit) {
+  Mask mask(picture.rays.width(), picture.rays.height(), 0);
+  for (int y = 0; y < mask.height(); ++y)
+    for (int x = 0; x < mask.width(); ++x) {
+      const float* rgb = picture.rgb.pixel(x, y);
+      const Eigen::Vector3d direction = picture.rays.direction(x + 0.5, y + 0.5);
+      if (direction.z() < 0 || std::max({rgb[0], rgb[1], rgb[2]}) < picture.clip) continue;
+      const FacetLight& facet = fit.light.facets[fit.light.sphere->facet_at(direction)];
+      if (facet.clipped > facet.weight) mask.at(x, y) = 255;
+    }
+  return mask;
+}
+
 }  // namespace
 
 Mask soft_sky_mask(const SkyPicture& picture, const SkyFit& fit) {
+  if (fit.sky.fallback == kClippedSky) return clipped_mask(picture, fit);
   if (!fit.sky.has_light()) return Mask(picture.rays.width(), picture.rays.height(), 0);
   return PixelMasking(picture, fit).take();
 }

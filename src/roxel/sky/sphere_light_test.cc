@@ -82,7 +82,8 @@ TEST(PixelRays, SolidAnglesOfAPinholePictureAreThatOfItsPyramid) {
 }
 
 TEST(PixelRays, PositionIsTheInverseOfDirection) {
-  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
   for (const PixelRays& rays : {PixelRays(camera(), turn), PixelRays(Equirectangular{200, 100})}) {
     const auto at = rays.position(rays.direction(13.25, 7.5));
     ASSERT_TRUE(at);
@@ -133,13 +134,15 @@ TEST(SphereLight, OfOneColourHasThatMeanAndNoVariance) {
 
 TEST(SphereLight, FacetsInsideThePictureAreCoveredWhole) {
   const SphereLight light = light_of({plain(1)});
-  const int inside = light.sphere->facet_at(PixelRays(camera(), Eigen::Matrix3d::Identity()).direction(30, 20));
+  const int inside =
+      light.sphere->facet_at(PixelRays(camera(), Eigen::Matrix3d::Identity()).direction(30, 20));
   EXPECT_NEAR(light.facets[inside].coverage, 1, 0.05);
 }
 
 TEST(SphereLight, AveragesPicturesAndReportsTheirDisagreement) {
   const SphereLight light = light_of({plain(1), plain(3)});
-  const int inside = light.sphere->facet_at(PixelRays(camera(), Eigen::Matrix3d::Identity()).direction(30, 20));
+  const int inside =
+      light.sphere->facet_at(PixelRays(camera(), Eigen::Matrix3d::Identity()).direction(30, 20));
   EXPECT_EQ(light.facets[inside].pictures, 2);
   EXPECT_NEAR(light.facets[inside].mean[0], 2, 1e-9);
   EXPECT_NEAR(light.facets[inside].disagreement, 0.5, 1e-9);
