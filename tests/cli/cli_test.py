@@ -259,7 +259,7 @@ CHANGES = {
     "white-point": ([], ["--white-point", "A"]),
 }
 # Options that change files or what is said, and not the numbers; the tests of Switches are theirs.
-ELSEWHERE = {"depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "threads", "verbose"}
+ELSEWHERE = {"depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "sky", "threads", "verbose"}
 
 
 def numbers(summary):

@@ -237,5 +237,60 @@ def main():
     unittest.main(argv=[sys.argv[0], *sys.argv[1:]])
 
 
+
+class SkyInReconstruct(SkyCase):
+    """A street of three nodes, each with its own time."""
+
+    SMALL = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--quiet"]
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.street = cls.folder / "street"
+        made = cli_test.run("synth", "street", "-o", cls.street, "--images", "48", "--size", "48x38", "--samples", "1", "--quiet")
+        assert made.returncode == 0, made.stderr
+
+    def reconstruct(self, name, *arguments):
+        out = self.folder / name
+        self.succeed("reconstruct", self.street, "-o", out, *self.SMALL, *arguments)
+        return out, json.loads((out / "summary.json").read_text())
+
+    def lights(self, summary):
+        by_node = {}
+        for view in summary["views"]: by_node.setdefault(view["name"][:3], set()).add(tuple(view["light"]))
+        return by_node
+
+    def test_skies_of_another_run_give_light_and_background(self):
+        skies, _ = self.sky("street-sky", "--no-pictures", data=self.street)
+        _, plain = self.reconstruct("plain")
+        out, lit = self.reconstruct("lit", "--sky", skies)
+        self.assertEqual(plain["scene"]["light"]["illumination"], "none")
+        self.assertEqual((lit["scene"]["light"]["illumination"], lit["scene"]["light"]["matching"]), ("sky", "local"))
+        self.assertEqual((plain["scene"]["background"]["kind"], lit["scene"]["background"]["kind"]), ("unknown", "mask"))
+        lights = self.lights(lit)
+        self.assertEqual({len(l) for l in lights.values()}, {1})  # one light a node
+        self.assertEqual(len(set.union(*lights.values())), len(lights))
+        self.assertNotEqual(digest(out / "voxels.ply"), digest(self.folder / "plain" / "voxels.ply"))
+
+    def test_skies_are_fitted_where_they_are_asked_for(self):
+        skies, _ = self.sky("street-sky2", "--no-pictures", data=self.street)
+        _, given = self.reconstruct("given", "--sky", skies, "--illumination", "sky")
+        out, fitted = self.reconstruct("fitted", "--illumination", "sky")
+        self.assertEqual(self.lights(given), self.lights(fitted))
+        self.assertEqual(len(fitted["skies"]), len(self.lights(fitted)))
+        self.assertIn("sky", [stage["name"] for stage in fitted["stages"]])
+        self.assertIn("sky/n00.json", files_below(out))
+        again, refitted = self.reconstruct("again", "--sky", out)  # a reconstruction's skies serve as well
+        self.assertEqual(self.lights(fitted), self.lights(refitted))
+        self.reconstruct("fitted", "--illumination", "none")  # a run that is replaced takes its skies with it
+        self.assertNotIn("sky/n00.json", files_below(out))
+
+    def test_skies_of_other_photographs_are_refused(self):
+        skies, _ = self.sky("square")
+        self.expect_error(2, "skies of other photographs", "reconstruct", self.street, "-o", self.folder / "no", "--sky", skies)
+        self.expect_error(2, "missing", "reconstruct", self.street, "-o", self.folder / "no", "--sky", self.folder / "missing")
+        self.assertFalse((self.folder / "no").exists())
+
+
 if __name__ == "__main__":
     main()
