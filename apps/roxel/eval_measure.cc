@@ -27,6 +27,7 @@ constexpr std::size_t kMostColorPixels = 2000000;
 /// One view as far as its files are there.
 struct MeasuredView {
   std::optional<NamedDepthAccuracy> depth;
+  std::vector<NamedDepthAccuracy> methods;  ///< "volume", "bp", "refined"
   std::optional<Reliability> reliability;
   std::optional<NamedImageQuality> quality;
   std::optional<ViewDepth> estimate;  ///< pixels that count alone
@@ -119,6 +120,7 @@ class Measurement {
       views[v] = measure_view(source_.view_names[v]);
     });
     for (MeasuredView& view : views) {
+      for (const NamedDepthAccuracy& method : view.methods) add_method(method);
       if (view.depth) out_.depth.push_back(std::move(*view.depth));
       if (view.quality) out_.images.push_back(std::move(*view.quality));
       if (view.estimate) estimates_.push_back(std::move(*view.estimate));
@@ -128,6 +130,12 @@ class Measurement {
     }
     if (out_.depth.empty()) note_unmatched("depth", "depth map");
     keep_seen_samples();
+  }
+
+  void add_method(const NamedDepthAccuracy& method) {
+    for (NamedDepthAccuracy& known : out_.depth_methods)
+      if (known.name == method.name) return known.accuracy.add(method.accuracy);
+    out_.depth_methods.push_back(method);
   }
 
   /// Truth that is there and goes with nothing of the run.
@@ -164,9 +172,15 @@ class Measurement {
     DepthAccuracyOptions options;
     options.voxel_size = source_.voxel_size();
     options.distances = options_.depth_within;
-    out.depth = {name,
-                 depth_accuracy({estimate.depth.data(), estimate.variance.data(), estimate.opacity.data()},
-                                truth.data(), options)};
+    const auto add = [&](const char* method, const Image& depth, const Image& variance) {
+      if (depth.empty()) return;
+      out.methods.push_back({method, depth_accuracy({depth.data(), variance.data(), estimate.opacity.data()},
+                                                    truth.data(), options)});
+    };
+    add("volume", estimate.depth, estimate.variance);
+    add("bp", estimate.depth_bp, estimate.variance_bp);
+    add("refined", estimate.depth_refined, estimate.variance_refined);
+    out.depth = {name, out.methods.front().accuracy};
     out.reliability = reliability(estimate.opacity.data(), truth.data());
   }
 

@@ -18,6 +18,7 @@ Commands make_commands() {
   Commands commands;
   add_info(commands);
   add_reconstruct(commands);
+  add_depth(commands);
   add_render(commands);
   add_eval(commands);
   add_merge(commands);

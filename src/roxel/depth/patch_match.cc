@@ -1,0 +1,260 @@
+#include "roxel/depth/patch_match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "roxel/base/kernel.h"
+#include "roxel/base/lanes.h"
+
+namespace roxel {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kLikeColor = 0.15f;  ///< difference of luma at which a sample counts e^-1/2
+constexpr float kGapShare = 0.02f;   ///< least relative gap in depth that is another surface
+
+/// A homography's numerators and denominator about the patch's middle.
+struct Steps {
+  float x0, xu, xv, y0, yu, yv, z0, zu, zv;
+};
+
+Steps steps_of(const PatchWarp& warp, const PixelPlane& plane, double u, double v) {
+  const Eigen::Vector3d at = warp.from_pixel * Eigen::Vector3d(u, v, 1) + plane.w * warp.parallax;
+  const Eigen::Vector3d du = warp.from_pixel.col(0) + plane.wu * warp.parallax;
+  const Eigen::Vector3d dv = warp.from_pixel.col(1) + plane.wv * warp.parallax;
+  return {static_cast<float>(at.x()), static_cast<float>(du.x()), static_cast<float>(dv.x()),
+          static_cast<float>(at.y()), static_cast<float>(du.y()), static_cast<float>(dv.y()),
+          static_cast<float>(at.z()), static_cast<float>(du.z()), static_cast<float>(dv.z())};
+}
+
+struct Sums {
+  float v, vv, rv;
+};
+
+/// Weighted sums over the samples, which must all lie inside the image; values are interpolated linearly.
+ROXEL_KERNEL Sums sum_samples(const float* luma, int width, const Steps& s, const float* du, const float* dv,
+                              const float* weight, const float* value, int count) {
+  Floats v{}, vv{}, rv{};
+  for (int i = 0; i < count; i += kLanes) {
+    Floats u_i, v_i, w_i, r_i;
+    load(du + i, u_i);
+    load(dv + i, v_i);
+    load(weight + i, w_i);
+    load(value + i, r_i);
+    const Floats z = 1 / (s.z0 + s.zu * u_i + s.zv * v_i);
+    const Floats x = (s.x0 + s.xu * u_i + s.xv * v_i) * z - 0.5f;
+    const Floats y = (s.y0 + s.yu * u_i + s.yv * v_i) * z - 0.5f;
+    const Ints ix = __builtin_convertvector(x, Ints), iy = __builtin_convertvector(y, Ints);
+    const Floats fx = x - __builtin_convertvector(ix, Floats), fy = y - __builtin_convertvector(iy, Floats);
+    const Ints at = iy * width + ix;
+    std::int32_t offset[kLanes];
+    store(at, offset);
+    float corner[4][kLanes];
+    for (int k = 0; k < kLanes; ++k) {
+      const float* p = luma + offset[k];
+      corner[0][k] = p[0];
+      corner[1][k] = p[1];
+      corner[2][k] = p[width];
+      corner[3][k] = p[width + 1];
+    }
+    Floats a, b, c, d;
+    load(corner[0], a);
+    load(corner[1], b);
+    load(corner[2], c);
+    load(corner[3], d);
+    const Floats top = a + fx * (b - a), bottom = c + fx * (d - c);
+    const Floats sample = top + fy * (bottom - top);
+    const Floats weighted = w_i * sample;
+    v += weighted;
+    vv += weighted * sample;
+    rv += weighted * r_i;
+  }
+  Sums sums{0, 0, 0};
+  for (int k = 0; k < kLanes; ++k) sums.v += v[k], sums.vv += vv[k], sums.rv += rv[k];
+  return sums;
+}
+
+/// Catmull-Rom weights of four samples for a position t in [0, 1) between the middle two, and their
+/// derivative.
+struct Cubic {
+  float w[4], d[4];
+  explicit Cubic(float t) {
+    const float t2 = t * t, t3 = t2 * t;
+    w[0] = 0.5f * (-t + 2 * t2 - t3);
+    w[1] = 0.5f * (2 - 5 * t2 + 3 * t3);
+    w[2] = 0.5f * (t + 4 * t2 - 3 * t3);
+    w[3] = 0.5f * (-t2 + t3);
+    d[0] = 0.5f * (-1 + 4 * t - 3 * t2);
+    d[1] = 0.5f * (-10 * t + 9 * t2);
+    d[2] = 0.5f * (1 + 8 * t - 9 * t2);
+    d[3] = 0.5f * (-2 * t + 3 * t2);
+  }
+};
+
+struct Sample {
+  float value, dx, dy;
+};
+
+Sample cubic_sample(const Image& luma, float x, float y) {
+  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+  const Cubic cx(x - static_cast<float>(ix)), cy(y - static_cast<float>(iy));
+  Sample out{0, 0, 0};
+  for (int j = 0; j < 4; ++j) {
+    const float* p = luma.pixel(ix - 1, iy - 1 + j);
+    const float row = cx.w[0] * p[0] + cx.w[1] * p[1] + cx.w[2] * p[2] + cx.w[3] * p[3];
+    const float slope = cx.d[0] * p[0] + cx.d[1] * p[1] + cx.d[2] * p[2] + cx.d[3] * p[3];
+    out.value += cy.w[j] * row;
+    out.dx += cy.w[j] * slope;
+    out.dy += cy.d[j] * row;
+  }
+  return out;
+}
+
+}  // namespace
+
+Image matching_luma(const Image& rgb, double white, const Mask& valid) {
+  Image luma(rgb.width(), rgb.height(), 1);
+  for (std::size_t i = 0; i < luma.data().size(); ++i) {
+    const float* p = rgb.data().data() + 3 * i;
+    const double y = (0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]) / white;
+    luma.data()[i] = static_cast<float>(std::cbrt(std::max(0.0, y) + 1e-3) - 0.1);
+    if (!valid.empty() && valid.data()[i] == 0) luma.data()[i] = kNaN;
+  }
+  return luma;
+}
+
+PatchWarp::PatchWarp(const PinholeCamera& reference, const PinholeCamera& source) {
+  const Eigen::Matrix3d k = source.intrinsics.matrix();
+  from_pixel = k * source.pose.rotation * reference.pose.rotation.transpose() *
+               reference.intrinsics.matrix().inverse();
+  parallax = k * source.pose.rotation * (reference.pose.centre - source.pose.centre);
+}
+
+Patch::Patch(const Image& luma, const PlaneMap& surface, int x, int y, const PatchOptions& options)
+    : u_(x), v_(y), radius_(options.radius), noise_variance_(options.noise * options.noise) {
+  const float middle = *luma.pixel(x, y);
+  if (!std::isfinite(middle)) return;
+  const PixelPlane& own = surface.at(x, y);
+  const float spread = 0.5f / static_cast<float>(radius_ * radius_);
+  double sum = 0, squares = 0, mean = 0;
+  for (int dy = -radius_; dy <= radius_; ++dy)
+    for (int dx = -radius_; dx <= radius_; ++dx) {
+      du_[count_] = static_cast<float>(dx);
+      dv_[count_] = static_cast<float>(dy);
+      float weight = 0, value = middle;
+      if (x + dx >= 0 && y + dy >= 0 && x + dx < luma.width() && y + dy < luma.height() &&
+          std::isfinite(*luma.pixel(x + dx, y + dy))) {
+        value = *luma.pixel(x + dx, y + dy);
+        const float off = (value - middle) / kLikeColor;
+        weight = std::exp(-0.5f * off * off - spread * static_cast<float>(dx * dx + dy * dy));
+        const PixelPlane& other = surface.at(x + dx, y + dy);
+        const float expected = own.at(static_cast<float>(dx), static_cast<float>(dy));
+        if (other.empty() || std::abs(other.w - expected) > kGapShare * own.w) weight = 0;
+      }
+      weight_[count_] = weight;
+      value_[count_] = value;
+      ++count_;
+      sum += weight;
+      squares += static_cast<double>(weight) * weight;
+      mean += static_cast<double>(weight) * value;
+    }
+  if (!(sum > 0)) return;
+  mean /= sum;
+  for (int i = 0; i < count_; ++i) {
+    weight_[i] = static_cast<float>(weight_[i] / sum);
+    value_[i] -= static_cast<float>(mean);
+    variance_ += static_cast<double>(weight_[i]) * value_[i] * value_[i];
+  }
+  while (count_ % 8 != 0) du_[count_] = dv_[count_] = weight_[count_] = value_[count_] = 0, ++count_;
+  sample_count_ = sum * sum / squares;
+  usable_ = sample_count_ >= 6;
+}
+
+bool Patch::corners_inside(const PatchSource& source, const PixelPlane& plane) const {
+  const Steps s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
+  const float r = static_cast<float>(radius_);
+  const float right = static_cast<float>(source.luma->width()) - 2.5f;
+  const float below = static_cast<float>(source.luma->height()) - 2.5f;
+  for (int corner = 0; corner < 4; ++corner) {
+    const float du = corner & 1 ? r : -r, dv = corner & 2 ? r : -r;
+    const float z = s.z0 + s.zu * du + s.zv * dv;
+    if (!(z > 0) || !(plane.at(du, dv) > 0)) return false;
+    const float x = (s.x0 + s.xu * du + s.xv * dv) / z - 0.5f, y = (s.y0 + s.yu * du + s.yv * dv) / z - 0.5f;
+    if (!(x >= 1.5f && y >= 1.5f && x < right && y < below)) return false;
+  }
+  return true;
+}
+
+float Patch::correlation(const PatchSource& source, const PixelPlane& plane) const {
+  if (!corners_inside(source, plane)) return kNaN;
+  const Steps s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
+  const Sums sums = sum_samples(source.luma->data().data(), source.luma->width(), s, du_.data(), dv_.data(),
+                                weight_.data(), value_.data(), count_);
+  const double variance = std::max(0.0, static_cast<double>(sums.vv) - static_cast<double>(sums.v) * sums.v);
+  return static_cast<float>(sums.rv /
+                            std::sqrt((variance + noise_variance_) * (variance_ + noise_variance_)));
+}
+
+Patch::Equations Patch::linearise(const PatchSource& source, const PixelPlane& plane) const {
+  Equations out;
+  if (!corners_inside(source, plane)) return out;
+  const Steps s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
+  const Eigen::Vector3d& m = source.warp.parallax;
+  const float mx = static_cast<float>(m.x()), my = static_cast<float>(m.y()), mz = static_cast<float>(m.z());
+  std::array<float, kMostSamples> value, slope;
+  double mean = 0, square = 0, cross = 0;
+  for (int i = 0; i < count_; ++i) {
+    value[i] = slope[i] = 0;
+    if (weight_[i] <= 0) continue;
+    const float z = 1 / (s.z0 + s.zu * du_[i] + s.zv * dv_[i]);
+    const float x = (s.x0 + s.xu * du_[i] + s.xv * dv_[i]) * z,
+                y = (s.y0 + s.yu * du_[i] + s.yv * dv_[i]) * z;
+    const Sample sample = cubic_sample(*source.luma, x - 0.5f, y - 0.5f);
+    value[i] = sample.value;
+    slope[i] = (sample.dx * (mx - x * mz) + sample.dy * (my - y * mz)) * z;
+    mean += static_cast<double>(weight_[i]) * value[i];
+  }
+  for (int i = 0; i < count_; ++i) {
+    const double centred = value[i] - mean;
+    square += weight_[i] * centred * centred;
+    cross += weight_[i] * centred * value_[i];
+  }
+  if (!std::isfinite(mean)) return out;
+  out.gain = cross / (square + noise_variance_);
+  if (!(out.gain > 0)) return out;
+  // Sums of J = gain x slope x (1, du, dv), of J x value, and of the residual; light's two unknowns taken
+  // out.
+  std::array<double, 3> j_mean{}, j_value{};
+  std::array<double, 6> jj{};
+  std::array<double, 3> je{};
+  for (int i = 0; i < count_; ++i) {
+    const double w = weight_[i];
+    if (w <= 0) continue;
+    const double centred = value[i] - mean;
+    const double residual = value_[i] - out.gain * centred;
+    const double j = out.gain * slope[i];
+    const std::array<double, 3> row{j, j * du_[i], j * dv_[i]};
+    for (int a = 0; a < 3; ++a) {
+      j_mean[a] += w * row[a];
+      j_value[a] += w * row[a] * centred;
+      je[a] += w * row[a] * residual;
+    }
+    jj[0] += w * row[0] * row[0], jj[1] += w * row[0] * row[1], jj[2] += w * row[0] * row[2];
+    jj[3] += w * row[1] * row[1], jj[4] += w * row[1] * row[2], jj[5] += w * row[2] * row[2];
+    out.residual += w * residual * residual;
+  }
+  const double inverse = 1 / (square + noise_variance_);
+  // The residual's own part along `value` is what noise left of the gain.
+  const double e_value = cross - out.gain * square;
+  int k = 0;
+  for (int a = 0; a < 3; ++a) {
+    for (int c = a; c < 3; ++c, ++k)
+      out.a[k] = jj[k] - j_mean[a] * j_mean[c] - inverse * j_value[a] * j_value[c];
+    out.b[a] = je[a] - inverse * j_value[a] * e_value;
+  }
+  out.valid = true;
+  return out;
+}
+
+}  // namespace roxel
