@@ -1,6 +1,8 @@
 #include "roxel/depth/agree_views.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "roxel/base/parallel.h"
@@ -8,7 +10,13 @@
 namespace roxel {
 namespace {
 
-constexpr double kAgreeSigmas = 3;  ///< deviations within which two views speak of one surface
+constexpr double kAgreeSigmas = 3;       ///< deviations within which two views speak of one surface
+constexpr double kFarthest = 0.02;       ///< relative difference of depth that is another surface
+constexpr double kMedianSigma = 0.6745;  ///< median of |x| of a standard Gaussian
+constexpr double kShared =
+    0.3;                     ///< share of a view's error variance that views of one surface have in common
+constexpr int kBins = 2000;  ///< of differences over deviations,
+constexpr double kBinsPerSigma = 50;  ///< up to 40
 
 /// What another view says of the inverse depth along a ray.
 struct Opinion {
@@ -25,52 +33,106 @@ std::optional<Opinion> ask(const AgreeingView& other, const Eigen::Vector3d& pix
   if (!(u >= 0 && v >= 0 && u < planes.width && v < planes.height)) return {};
   const int x = static_cast<int>(u), y = static_cast<int>(v);
   const PixelPlane& plane = planes.at(x, y);
-  if (plane.empty()) return {};
+  const double variance = *other.view->variance.pixel(x, y);
+  if (plane.empty() || !(variance > 0)) return {};
   // On the plane 1 = p . h / w with h as above.
   const Eigen::Vector3d p(plane.wu, plane.wv, plane.w - plane.wu * (x + 0.5) - plane.wv * (y + 0.5));
   const double facing = 1 - p.dot(other.warp.parallax);
   if (std::abs(facing) < 0.05) return {};
-  Opinion opinion;
-  opinion.w = p.dot(far) / facing;
   const double scale = h.z() / facing;  // d w / d (inverse depth there)
-  opinion.variance = scale * scale * *other.view->variance.pixel(x, y);
+  const Opinion opinion{p.dot(far) / facing, scale * scale * variance};
+  if (!(std::abs(opinion.w - w) < kFarthest * w)) return {};
   return opinion;
 }
+
+/// Asks for one view, row by row.
+class Agreement {
+ public:
+  Agreement(const RefinedView& own, std::span<const AgreeingView> others, const RunContext& context)
+      : own_(own), others_(others), context_(context) {}
+
+  AgreedView join() {
+    const double stretch = measure_stretch();
+    AgreedView out{own_.planes, own_.variance, Image(own_.planes.width, own_.planes.height, 1), stretch};
+    for_each_row([&](int y) {
+      for (int x = 0; x < own_.planes.width; ++x) join_pixel(x, y, stretch, out);
+    });
+    return out;
+  }
+
+ private:
+  template <class Body>
+  void for_each_row(const Body& body) const {
+    parallel_for(own_.planes.height, context_.thread_count(), [&](std::int64_t row, int) {
+      context_.throw_if_cancelled();
+      body(static_cast<int>(row));
+    });
+  }
+
+  /// Median of the differences between views over their deviations, against what it should be.
+  double measure_stretch() const {
+    std::vector<std::vector<std::int64_t>> rows(own_.planes.height);
+    for_each_row([&](int y) {
+      rows[y].assign(kBins, 0);
+      for (int x = 0; x < own_.planes.width; ++x) {
+        const PixelPlane& plane = own_.planes.at(x, y);
+        if (plane.empty()) continue;
+        for (const AgreeingView& other : others_) {
+          const auto opinion = ask(other, {x + 0.5, y + 0.5, 1}, plane.w);
+          if (!opinion) continue;
+          const double off =
+              std::abs(opinion->w - plane.w) / std::sqrt(*own_.variance.pixel(x, y) + opinion->variance);
+          ++rows[y][static_cast<std::size_t>(std::min(off * kBinsPerSigma, kBins - 1.0))];
+        }
+      }
+    });
+    std::vector<std::int64_t> bins(kBins, 0);
+    for (const auto& row : rows)
+      for (int b = 0; b < kBins; ++b) bins[b] += row[b];
+    const std::int64_t total = std::accumulate(bins.begin(), bins.end(), std::int64_t{0});
+    if (total == 0) return 1;
+    std::int64_t count = 0;
+    int bin = 0;
+    while (bin + 1 < kBins && 2 * (count + bins[bin]) < total) count += bins[bin++];
+    return std::max(1.0, (bin + 0.5) / kBinsPerSigma / kMedianSigma);
+  }
+
+  void join_pixel(int x, int y, double stretch, AgreedView& out) const {
+    PixelPlane& plane = out.planes.at(x, y);
+    if (plane.empty()) return;
+    const double w = plane.w, variance = stretch * stretch * *own_.variance.pixel(x, y);
+    double weight = 1 / variance, first = 0, second = 0;
+    int agreeing = 0;
+    for (const AgreeingView& other : others_) {
+      auto opinion = ask(other, {x + 0.5, y + 0.5, 1}, w);
+      if (!opinion) continue;
+      opinion->variance *= stretch * stretch;
+      const double off = opinion->w - w;
+      if (off * off > kAgreeSigmas * kAgreeSigmas * (variance + opinion->variance)) continue;
+      weight += 1 / opinion->variance;
+      first += off / opinion->variance;
+      second += off * off / opinion->variance;
+      ++agreeing;
+    }
+    *out.views.pixel(x, y) = static_cast<float>(agreeing);
+    const double mean = first / weight;
+    // What all views share does not shrink with their number.
+    const double chi2 = agreeing > 0 ? std::max(1.0, (second - mean * first) / agreeing) : 1;
+    const double single = (1 + agreeing) / weight;
+    plane.w = static_cast<float>(w + mean);
+    *out.variance.pixel(x, y) = static_cast<float>(chi2 * (kShared * single + (1 - kShared) / weight));
+  }
+
+  const RefinedView& own_;
+  std::span<const AgreeingView> others_;
+  const RunContext& context_;
+};
 
 }  // namespace
 
 AgreedView agree_views(const RefinedView& own, std::span<const AgreeingView> others,
                        const RunContext& context) {
-  const int width = own.planes.width, height = own.planes.height;
-  AgreedView out{own.planes, own.variance, Image(width, height, 1)};
-  parallel_for(height, context.thread_count(), [&](std::int64_t row, int) {
-    context.throw_if_cancelled();
-    const int y = static_cast<int>(row);
-    for (int x = 0; x < width; ++x) {
-      PixelPlane& plane = out.planes.at(x, y);
-      if (plane.empty()) continue;
-      const double w = plane.w, variance = *own.variance.pixel(x, y);
-      double weight = 1 / variance, first = 0, second = 0;
-      int agreeing = 0;
-      for (const AgreeingView& other : others) {
-        const auto opinion = ask(other, Eigen::Vector3d(x + 0.5, y + 0.5, 1), w);
-        if (!opinion || !(opinion->variance > 0)) continue;
-        const double off = opinion->w - w;
-        if (off * off > kAgreeSigmas * kAgreeSigmas * (variance + opinion->variance)) continue;
-        weight += 1 / opinion->variance;
-        first += off / opinion->variance;
-        second += off * off / opinion->variance;
-        ++agreeing;
-      }
-      *out.views.pixel(x, y) = static_cast<float>(agreeing);
-      if (agreeing == 0) continue;
-      const double mean = first / weight;
-      const double chi2 = (second - mean * first) / agreeing;
-      plane.w = static_cast<float>(w + mean);
-      *out.variance.pixel(x, y) = static_cast<float>(std::max(1.0, chi2) / weight);
-    }
-  });
-  return out;
+  return Agreement(own, others, context).join();
 }
 
 }  // namespace roxel

@@ -18,8 +18,9 @@ struct AgreeingView {
 /// One view after the others were asked.
 struct AgreedView {
   PlaneMap planes;
-  Image variance;  ///< of w
-  Image views;     ///< how many others agree
+  Image variance;      ///< of w
+  Image views;         ///< how many others agree
+  double stretch = 1;  ///< by which deviations were too small, as the views differ
 };
 
 AgreedView agree_views(const RefinedView& own, std::span<const AgreeingView> others,

@@ -23,7 +23,7 @@ struct DepthStageOptions {
 
   bool refine = true;
   int refine_views = 8;
-  int refine_rounds = 3;
+  int refine_rounds = 2;
   int refine_radius = 3;
   double refine_sigmas = 4;
   double refine_noise = 0.006;

@@ -75,12 +75,12 @@ ROXEL_KERNEL Sums sum_samples(const float* luma, int width, const Steps& s, cons
   return sums;
 }
 
-/// Catmull-Rom weights of four samples for a position t in [0, 1) between the middle two, and their
-/// derivative.
+/// Catmull-Rom weights of four samples for positions t in [0, 1) between the middle two, and their
+/// derivatives.
 struct Cubic {
-  float w[4], d[4];
-  explicit Cubic(float t) {
-    const float t2 = t * t, t3 = t2 * t;
+  Floats w[4], d[4];
+  inline __attribute__((always_inline)) explicit Cubic(const Floats& t) {
+    const Floats t2 = t * t, t3 = t2 * t;
     w[0] = 0.5f * (-t + 2 * t2 - t3);
     w[1] = 0.5f * (2 - 5 * t2 + 3 * t3);
     w[2] = 0.5f * (t + 4 * t2 - 3 * t3);
@@ -92,23 +92,88 @@ struct Cubic {
   }
 };
 
-struct Sample {
-  float value, dx, dy;
+/// Where patches are sampled for least squares, and what comes of it.
+struct CubicSamples {
+  const float *du, *dv, *weight;
+  int count;
+  float parallax[3];
+  float *value, *slope;  ///< of each sample, and its change with the inverse depth
 };
 
-Sample cubic_sample(const Image& luma, float x, float y) {
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const Cubic cx(x - static_cast<float>(ix)), cy(y - static_cast<float>(iy));
-  Sample out{0, 0, 0};
-  for (int j = 0; j < 4; ++j) {
-    const float* p = luma.pixel(ix - 1, iy - 1 + j);
-    const float row = cx.w[0] * p[0] + cx.w[1] * p[1] + cx.w[2] * p[2] + cx.w[3] * p[3];
-    const float slope = cx.d[0] * p[0] + cx.d[1] * p[1] + cx.d[2] * p[2] + cx.d[3] * p[3];
-    out.value += cy.w[j] * row;
-    out.dx += cy.w[j] * slope;
-    out.dy += cy.d[j] * row;
+/// Values are interpolated by cubics: linear interpolation would pull depths to where samples fall on pixels.
+ROXEL_KERNEL float sample_cubic(const float* luma, int width, const Steps& s, const CubicSamples& out) {
+  Floats mean{};
+  for (int i = 0; i < out.count; i += kLanes) {
+    Floats u_i, v_i, w_i;
+    load(out.du + i, u_i);
+    load(out.dv + i, v_i);
+    load(out.weight + i, w_i);
+    const Floats z = 1 / (s.z0 + s.zu * u_i + s.zv * v_i);
+    const Floats hx = (s.x0 + s.xu * u_i + s.xv * v_i) * z, hy = (s.y0 + s.yu * u_i + s.yv * v_i) * z;
+    const Floats x = hx - 0.5f, y = hy - 0.5f;
+    const Ints ix = __builtin_convertvector(x, Ints), iy = __builtin_convertvector(y, Ints);
+    const Cubic cx(x - __builtin_convertvector(ix, Floats)), cy(y - __builtin_convertvector(iy, Floats));
+    std::int32_t offset[kLanes];
+    store((iy - 1) * width + ix - 1, offset);
+    Floats value{}, gx{}, gy{};
+    for (int j = 0; j < 4; ++j) {
+      Floats row{}, slope{};
+      for (int c = 0; c < 4; ++c) {
+        float taps[kLanes];
+        for (int k = 0; k < kLanes; ++k) taps[k] = luma[offset[k] + j * width + c];
+        Floats tap;
+        load(taps, tap);
+        row += cx.w[c] * tap;
+        slope += cx.d[c] * tap;
+      }
+      value += cy.w[j] * row;
+      gx += cy.w[j] * slope;
+      gy += cy.d[j] * row;
+    }
+    store(value, out.value + i);
+    store((gx * (out.parallax[0] - hx * out.parallax[2]) + gy * (out.parallax[1] - hy * out.parallax[2])) * z,
+          out.slope + i);
+    mean += w_i * value;
   }
-  return out;
+  float sum = 0;
+  for (int k = 0; k < kLanes; ++k) sum += mean[k];
+  return sum;
+}
+
+/// Weighted sums over the samples: c = value - mean, r the reference's value, g the slope.
+struct Moments {
+  float cc, cr, rr;
+  float g[3], gc[3], gr[3];  ///< times 1, du, dv
+  float gg[6];               ///< times 1, du, dv, du du, du dv, dv dv
+};
+
+ROXEL_KERNEL Moments moments_of(const CubicSamples& in, const float* reference, float mean) {
+  Floats sum[18]{};
+  for (int i = 0; i < in.count; i += kLanes) {
+    Floats u, v, w, value, slope, r;
+    load(in.du + i, u);
+    load(in.dv + i, v);
+    load(in.weight + i, w);
+    load(in.value + i, value);
+    load(in.slope + i, slope);
+    load(reference + i, r);
+    const Floats c = value - mean, wg = w * slope, wgg = wg * slope, wc = w * c;
+    sum[0] += wc * c, sum[1] += wc * r, sum[2] += w * r * r;
+    sum[3] += wg, sum[4] += wg * u, sum[5] += wg * v;
+    sum[6] += wg * c, sum[7] += wg * c * u, sum[8] += wg * c * v;
+    sum[9] += wg * r, sum[10] += wg * r * u, sum[11] += wg * r * v;
+    sum[12] += wgg, sum[13] += wgg * u, sum[14] += wgg * v;
+    sum[15] += wgg * u * u, sum[16] += wgg * u * v, sum[17] += wgg * v * v;
+  }
+  float total[18];
+  for (int k = 0; k < 18; ++k) {
+    total[k] = 0;
+    for (int lane = 0; lane < kLanes; ++lane) total[k] += sum[k][lane];
+  }
+  Moments m{total[0], total[1], total[2], {}, {}, {}, {}};
+  for (int k = 0; k < 3; ++k) m.g[k] = total[3 + k], m.gc[k] = total[6 + k], m.gr[k] = total[9 + k];
+  for (int k = 0; k < 6; ++k) m.gg[k] = total[12 + k];
+  return m;
 }
 
 }  // namespace
@@ -200,59 +265,32 @@ Patch::Equations Patch::linearise(const PatchSource& source, const PixelPlane& p
   Equations out;
   if (!corners_inside(source, plane)) return out;
   const Steps s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
-  const Eigen::Vector3d& m = source.warp.parallax;
-  const float mx = static_cast<float>(m.x()), my = static_cast<float>(m.y()), mz = static_cast<float>(m.z());
-  std::array<float, kMostSamples> value, slope;
-  double mean = 0, square = 0, cross = 0;
-  for (int i = 0; i < count_; ++i) {
-    value[i] = slope[i] = 0;
-    if (weight_[i] <= 0) continue;
-    const float z = 1 / (s.z0 + s.zu * du_[i] + s.zv * dv_[i]);
-    const float x = (s.x0 + s.xu * du_[i] + s.xv * dv_[i]) * z,
-                y = (s.y0 + s.yu * du_[i] + s.yv * dv_[i]) * z;
-    const Sample sample = cubic_sample(*source.luma, x - 0.5f, y - 0.5f);
-    value[i] = sample.value;
-    slope[i] = (sample.dx * (mx - x * mz) + sample.dy * (my - y * mz)) * z;
-    mean += static_cast<double>(weight_[i]) * value[i];
-  }
-  for (int i = 0; i < count_; ++i) {
-    const double centred = value[i] - mean;
-    square += weight_[i] * centred * centred;
-    cross += weight_[i] * centred * value_[i];
-  }
+  const Eigen::Vector3d& parallax = source.warp.parallax;
+  alignas(32) std::array<float, kMostSamples> value, slope;
+  const CubicSamples samples{
+      du_.data(),
+      dv_.data(),
+      weight_.data(),
+      count_,
+      {static_cast<float>(parallax.x()), static_cast<float>(parallax.y()), static_cast<float>(parallax.z())},
+      value.data(),
+      slope.data()};
+  const float mean = sample_cubic(source.luma->data().data(), source.luma->width(), s, samples);
   if (!std::isfinite(mean)) return out;
-  out.gain = cross / (square + noise_variance_);
+  const Moments m = moments_of(samples, value_.data(), mean);
+  out.gain = m.cr / (m.cc + noise_variance_);
   if (!(out.gain > 0)) return out;
-  // Sums of J = gain x slope x (1, du, dv), of J x value, and of the residual; light's two unknowns taken
-  // out.
-  std::array<double, 3> j_mean{}, j_value{};
-  std::array<double, 6> jj{};
-  std::array<double, 3> je{};
-  for (int i = 0; i < count_; ++i) {
-    const double w = weight_[i];
-    if (w <= 0) continue;
-    const double centred = value[i] - mean;
-    const double residual = value_[i] - out.gain * centred;
-    const double j = out.gain * slope[i];
-    const std::array<double, 3> row{j, j * du_[i], j * dv_[i]};
-    for (int a = 0; a < 3; ++a) {
-      j_mean[a] += w * row[a];
-      j_value[a] += w * row[a] * centred;
-      je[a] += w * row[a] * residual;
-    }
-    jj[0] += w * row[0] * row[0], jj[1] += w * row[0] * row[1], jj[2] += w * row[0] * row[2];
-    jj[3] += w * row[1] * row[1], jj[4] += w * row[1] * row[2], jj[5] += w * row[2] * row[2];
-    out.residual += w * residual * residual;
-  }
-  const double inverse = 1 / (square + noise_variance_);
-  // The residual's own part along `value` is what noise left of the gain.
-  const double e_value = cross - out.gain * square;
-  int k = 0;
-  for (int a = 0; a < 3; ++a) {
-    for (int c = a; c < 3; ++c, ++k)
-      out.a[k] = jj[k] - j_mean[a] * j_mean[c] - inverse * j_value[a] * j_value[c];
-    out.b[a] = je[a] - inverse * j_value[a] * e_value;
-  }
+  // J = gain x slope x (1, du, dv); the residual is r - gain c. Light's gain and offset are solved for: what
+  // J has of them is taken out.
+  const double g = out.gain, inverse = 1 / (m.cc + noise_variance_);
+  const double residual_c = m.cr - g * m.cc;
+  out.residual = std::max(0.0, m.rr - 2 * g * m.cr + g * g * m.cc);
+  static constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
+  for (int k = 0; k < 6; ++k)
+    out.a[k] = g * g *
+               (m.gg[k] - static_cast<double>(m.g[kRow[k]]) * m.g[kColumn[k]] -
+                inverse * m.gc[kRow[k]] * m.gc[kColumn[k]]);
+  for (int k = 0; k < 3; ++k) out.b[k] = g * (m.gr[k] - g * m.gc[k] - inverse * m.gc[k] * residual_c);
   out.valid = true;
   return out;
 }

@@ -9,6 +9,9 @@
 namespace roxel {
 namespace {
 
+/// Errors of a volume's depth are alike within a voxel: so many voxels' pixels count as one witness.
+constexpr double kVoxelsAlike = 1.5;
+constexpr double kGapVoxels = 0.3;         ///< roughness of the volume that is no gap
 constexpr double kMedianToSigma = 1.4826;  ///< of a Gaussian's absolute values
 constexpr float kLikeColor = 0.08f;        ///< difference of luma at which a tie is 1 / e^0.5 as strong
 constexpr float kWeakestColor = 0.02f;
@@ -33,7 +36,7 @@ class LatticeBuilder {
     for (std::size_t i = 0; i < field_.mean.size(); ++i) {
       if (!(depth_.data()[i] > 0)) continue;
       field_.mean[i] = depth_.data()[i];
-      field_.precision[i] = 1 / variance_at(i);
+      field_.precision[i] = 1 / (variance_at(i) * alike(depth_.data()[i]));
     }
     for (int y = 0; y < height_; ++y)
       for (int x = 0; x < width_; ++x) {
@@ -51,6 +54,13 @@ class LatticeBuilder {
   float variance_at(std::size_t i) const {
     const float z = depth_.data()[i];
     return std::max(layers_.variance.data()[i], 1e-12f * z * z);
+  }
+
+  /// Pixels that share one error.
+  float alike(float z) const {
+    if (!aware()) return 1;
+    const double side = kVoxelsAlike * guide_.voxel_size * guide_.focal_px / z;
+    return static_cast<float>(std::max(1.0, side * side));
   }
 
   /// How depth changes from a pixel to the next on the plane through its neighbourhood: mean of what the two
@@ -109,8 +119,9 @@ class LatticeBuilder {
         std::isfinite(off) ? std::max(kWeakestColor, std::exp(-0.5f * off * off)) : kWeakestColor;
     if (!both) return precision * color;
     const float gap = zb - za - expected;
-    const float spread =
-        kGapSigmas * kGapSigmas * (static_cast<float>(sigma_ * sigma_) + variance_at(a) + variance_at(b));
+    const float spread = static_cast<float>(
+        kGapSigmas * kGapSigmas *
+        (sigma_ * sigma_ + kGapVoxels * kGapVoxels * guide_.voxel_size * guide_.voxel_size));
     const float robust = 1 / (1 + gap * gap / spread);
     return precision * color * robust * robust;
   }
@@ -175,12 +186,13 @@ PropagationFigures propagate_depth(DepthLayers& layers, const PropagationGuide& 
     const bool had = field.precision[i] > 0;
     if (!(beliefs.precision[i] > 0) || !(beliefs.mean[i] > 0) || (!had && !options.fill)) continue;
     layers.depth_bp.data()[i] = beliefs.mean[i];
-    layers.variance_bp.data()[i] = 1 / beliefs.precision[i];
+    const float variance = 1 / beliefs.precision[i];
+    layers.variance_bp.data()[i] = had ? std::min(variance, layers.variance.data()[i]) : variance;
     figures.pixels += had;
     figures.filled += !had;
     if (!had) continue;
-    figures.variance_before += 1 / field.precision[i];
-    figures.variance_after += 1 / beliefs.precision[i];
+    figures.variance_before += layers.variance.data()[i];
+    figures.variance_after += layers.variance_bp.data()[i];
   }
   return figures;
 }

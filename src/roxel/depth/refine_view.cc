@@ -20,7 +20,9 @@ constexpr double kIndependent = 0.25;    ///< share of a patch's samples that er
 constexpr double kSlopeSigma = 0.6;      ///< tangent by which the volume's normals err
 constexpr double kSteepest = 6;          ///< tangent of the steepest plane
 constexpr float kLeastAgreement = 0.4f;  ///< correlation of a view that counts in the least squares
-constexpr int kLeastSquaresRounds = 4;
+constexpr int kLeastSquaresRounds = 3;
+constexpr double kStill = 0.02;  ///< step, in deviations, that ends the least squares
+constexpr int kViewsAPixel = 6;  ///< of the sources, those that show the patch best
 
 /// Well mixed bits of a few numbers [Steele14].
 std::uint64_t mix(std::uint64_t x) {
@@ -174,8 +176,26 @@ class ViewRefinement {
     visible_[i] = seen_by(x, y, i);
     if (visible_[i] == 0) return;
     const Patch patch = patch_at(x, y);
-    if (patch.usable()) best_[i] = judge(patch, start_.planes[i], i);
+    if (patch.usable()) {
+      keep_best_views(patch, i);
+      best_[i] = judge(patch, start_.planes[i], i);
+    }
     best_[i].plane = start_.planes[i];
+  }
+
+  /// Of many views that see a pixel, those that look most like it.
+  void keep_best_views(const Patch& patch, std::size_t i) {
+    if (std::popcount(visible_[i]) <= kViewsAPixel) return;
+    std::array<std::pair<float, int>, 32> match;
+    int count = 0;
+    for (std::uint32_t left = visible_[i]; left != 0; left &= left - 1) {
+      const int s = std::countr_zero(left);
+      const float correlation = patch.correlation(sources_[s], start_.planes[i]);
+      if (std::isfinite(correlation)) match[count++] = {-correlation, s};
+    }
+    std::sort(match.begin(), match.begin() + count);
+    visible_[i] = 0;
+    for (int k = 0; k < std::min(count, kViewsAPixel); ++k) visible_[i] |= 1u << match[k].second;
   }
 
   /// Tries the planes of neighbours of the other colour, and random ones ever nearer to the best.
@@ -188,8 +208,8 @@ class ViewRefinement {
       if (next.cost < best.cost) best = next;
     };
     static constexpr int kNear[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
-    const int reach = round == 0 ? 5 : 3;
-    for (int k = 0; k < 8; ++k) {
+    constexpr int reach = 5;
+    for (int k = 0; k < (round == 0 ? 8 : 4); ++k) {
       const int far = k < 4 ? 1 : reach;
       const int dx = far * kNear[k & 3][0], dy = far * kNear[k & 3][1];
       if (x + dx < 0 || y + dy < 0 || x + dx >= width_ || y + dy >= height_) continue;
@@ -200,7 +220,7 @@ class ViewRefinement {
     }
     PixelDice dice(options_.seed, i, round);
     const float sigma = sigma_w(i), slope = start_.planes[i].w / focal_;
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 2; ++k) {
       const float size = std::ldexp(1.0f, -round - k);
       PixelPlane plane = best.plane;
       plane.w += 2 * sigma * size * dice.roll();
@@ -262,9 +282,11 @@ class ViewRefinement {
         const Joint joint = join(patch, plane, agreeing, i);
         const Eigen::Vector3d step = joint.a.ldlt().solve(joint.b);
         if (!step.allFinite()) break;
+        const bool still = step[0] * step[0] * joint.a(0, 0) < kStill * kStill;
         plane.w += static_cast<float>(step[0]);
         plane.wu += static_cast<float>(step[1]);
         plane.wv += static_cast<float>(step[2]);
+        if (still) break;
       }
       const Hypothesis polished = judge(patch, plane, i);
       if (polished.cost <= best.cost * 1.02f + 0.1f) best = polished;
