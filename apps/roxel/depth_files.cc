@@ -32,7 +32,8 @@ class KeptPlanes {
 
   void keep(int view_idx, const RefinedView& view) const {
     const PlaneMap& map = view.planes;
-    std::vector<FloatChannel> channels{{"V", view.variance}, {"C", view.correlation}};
+    std::vector<FloatChannel> channels{
+        {"V", view.variance}, {"V.shared", view.shared}, {"C", view.correlation}};
     for (int c = 0; c < 3; ++c) {
       Image plane(map.width, map.height, 1);
       for (std::size_t i = 0; i < map.planes.size(); ++i)
@@ -44,7 +45,8 @@ class KeptPlanes {
 
   RefinedView recall(int view_idx) const {
     const std::vector<FloatChannel> channels = read_exr_channels(file(view_idx));
-    RefinedView view{{}, *find_channel(channels, "V"), *find_channel(channels, "C")};
+    RefinedView view{
+        {}, *find_channel(channels, "V"), *find_channel(channels, "V.shared"), *find_channel(channels, "C")};
     view.planes = PlaneMap(view.variance.width(), view.variance.height());
     const Image *w = find_channel(channels, kPlaneChannels[0]),
                 *wu = find_channel(channels, kPlaneChannels[1]),
@@ -82,6 +84,17 @@ void write_picture(const fs::path& results, const View& view, const DepthLayers&
             depth_picture(depth, layers.opacity, shown_depths(depth, layers.opacity)), kAsItIs);
 }
 
+/// Unit vectors as colours: -1 to 1 as black to full.
+Image normal_picture(const Image& normal) {
+  Image picture(normal.width(), normal.height(), 3);
+  for (std::size_t i = 0; i < normal.data().size(); i += 3) {
+    const float* n = &normal.data()[i];
+    if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;
+    for (int c = 0; c < 3; ++c) picture.data()[i + c] = 0.5f + 0.5f * n[c];
+  }
+  return picture;
+}
+
 double mean(double sum, std::int64_t count) { return count > 0 ? sum / static_cast<double>(count) : 0; }
 
 }  // namespace
@@ -92,14 +105,32 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
                                      double progress_begin, double progress_end) {
   const KeptPlanes kept(folders.results, dataset);
   DepthFiles files;
-  files.read = [&](int v) { return read_layers(folders, dataset.views[v]); };
+  files.read = [&](int v) {
+    DepthLayers layers = read_layers(folders, dataset.views[v]);
+    if (!options.bp) layers.depth_bp = layers.variance_bp = {};  // of an earlier time
+    layers.depth_refined = layers.variance_refined = layers.normal = {};
+    return layers;
+  };
   files.write = [&](int v, const DepthLayers& layers) {
     write_depth(depth_path(folders.results, dataset.views[v].name), layers);
     write_picture(folders.results, dataset.views[v], layers);
   };
   files.keep = [&](int v, const RefinedView& view) { kept.keep(v, view); };
   files.recall = [&](int v) { return kept.recall(v); };
-  return run_depth_stage(dataset, load, scene, files, options, context, progress_begin, progress_end);
+  DepthStageOptions first = options, second = options;
+  first.refine = false;
+  second.bp = false;
+  const double middle = options.bp ? progress_begin + 0.15 * (progress_end - progress_begin) : progress_begin;
+  DepthStageFigures figures;
+  if (options.bp) {
+    figures = run_depth_stage(dataset, load, scene, files, first, context, progress_begin, middle);
+    figures.propagate_peak_bytes = peak_memory_bytes();
+  }
+  if (options.refine) {
+    figures.add(run_depth_stage(dataset, load, scene, files, second, context, middle, progress_end));
+    figures.refine_peak_bytes = peak_memory_bytes();
+  }
+  return figures;
 }
 
 ordered_json to_json(const DepthStageFigures& figures) {
@@ -123,10 +154,27 @@ ordered_json to_json(const DepthStageFigures& figures) {
   return json;
 }
 
+void add_refined_pictures(const fs::path& run, double voxel_size, ReportView& view) {
+  const DepthLayers layers = read_depth(depth_path(run, view.name));
+  const auto add = [&](const std::string& method, const Image& depth, const Image& variance) {
+    if (depth.empty()) return;
+    view.pictures.push_back(report_picture(
+        "depth, " + method, depth_picture(depth, layers.opacity, shown_depths(depth, layers.opacity))));
+    view.pictures.push_back(report_picture("sigma of depth, " + method,
+                                           sigma_picture(variance, depth, layers.opacity, voxel_size)));
+  };
+  add("after belief propagation", layers.depth_bp, layers.variance_bp);
+  add("refined", layers.depth_refined, layers.variance_refined);
+  if (!layers.normal.empty())
+    view.pictures.push_back(report_picture("normals", normal_picture(layers.normal)));
+}
+
 std::vector<StageRecord> stage_records(const DepthStageFigures& figures) {
   std::vector<StageRecord> records;
-  if (figures.propagate_seconds > 0) records.push_back({"belief propagation", figures.propagate_seconds});
-  if (figures.refine_seconds > 0) records.push_back({"refine depth", figures.refine_seconds});
+  if (figures.propagate_seconds > 0)
+    records.push_back({"belief propagation", figures.propagate_seconds, figures.propagate_peak_bytes});
+  if (figures.refine_seconds > 0)
+    records.push_back({"refine depth", figures.refine_seconds, figures.refine_peak_bytes});
   return records;
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "roxel/depth/depth_stage.h"
+#include "roxel/report/html_report.h"
 #include "roxel/solve/summary.h"
 
 namespace roxel::cli {
@@ -22,8 +23,10 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
                                      const DepthStageOptions& options, RunContext& context,
                                      double progress_begin, double progress_end);
 
-/// Throws InvalidInput where no pixel of any view has depth.
 nlohmann::ordered_json to_json(const DepthStageFigures& figures);
+
+/// Adds to a page's view what its file says of the refined depth, if anything.
+void add_refined_pictures(const std::filesystem::path& run, double voxel_size, ReportView& view);
 
 /// The stages that it was, with their times.
 std::vector<StageRecord> stage_records(const DepthStageFigures& figures);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <mutex>
 
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
@@ -31,6 +33,7 @@ struct MeasuredView {
   std::optional<Reliability> reliability;
   std::optional<NamedImageQuality> quality;
   std::optional<ViewDepth> estimate;  ///< pixels that count alone
+  std::optional<ViewDepth> refined;   ///< the same of the refined depth
 };
 
 std::string size_text(const Image& image) {
@@ -124,6 +127,7 @@ class Measurement {
       if (view.depth) out_.depth.push_back(std::move(*view.depth));
       if (view.quality) out_.images.push_back(std::move(*view.quality));
       if (view.estimate) estimates_.push_back(std::move(*view.estimate));
+      if (view.refined) refined_.push_back(std::move(*view.refined));
       if (!view.reliability) continue;
       if (!out_.opacity_reliability) out_.opacity_reliability.emplace();
       out_.opacity_reliability->add(*view.reliability);
@@ -162,7 +166,9 @@ class Measurement {
       }
     }
     if (estimate && !truth.empty()) measure_depth(name, *estimate, truth, out);
-    if (estimate && view) out.estimate = countable(*estimate, view->camera);
+    if (estimate && view) out.estimate = countable(*estimate, estimate->depth, view->camera);
+    if (estimate && view && !estimate->depth_refined.empty())
+      out.refined = countable(*estimate, estimate->depth_refined, view->camera);
     if (view) out.quality = measure_render(*view, estimate ? &*estimate : nullptr, truth);
     return out;
   }
@@ -177,6 +183,23 @@ class Measurement {
       out.methods.push_back({method, depth_accuracy({depth.data(), variance.data(), estimate.opacity.data()},
                                                     truth.data(), options)});
     };
+    if (getenv("CALIB") && !estimate.depth_refined.empty()) {
+      static std::mutex mu;
+      static std::map<int, std::vector<float>> bins;
+      std::lock_guard lock(mu);
+      for (std::size_t i = 0; i < truth.data().size(); ++i)
+        if (truth.data()[i] > 0 && estimate.depth_refined.data()[i] > 0) {
+          float s = std::sqrt(estimate.variance_refined.data()[i]);
+          bins[int(std::floor(2 * std::log2(s / options.voxel_size)))].push_back(
+              std::abs(estimate.depth_refined.data()[i] - truth.data()[i]) / s);
+        }
+      if (name == source_.view_names.back())
+        for (auto& [b, v] : bins) {
+          std::sort(v.begin(), v.end());
+          fprintf(stderr, "sigma %.4f n %zu p50 %.2f p68 %.2f p95 %.2f\n", std::exp2(b / 2.0 + .25), v.size(),
+                  v[v.size() / 2], v[v.size() * 68 / 100], v[v.size() * 95 / 100]);
+        }
+    }
     add("volume", estimate.depth, estimate.variance);
     add("bp", estimate.depth_bp, estimate.variance_bp);
     add("refined", estimate.depth_refined, estimate.variance_refined);
@@ -184,8 +207,8 @@ class Measurement {
     out.reliability = reliability(estimate.opacity.data(), truth.data());
   }
 
-  static ViewDepth countable(const DepthLayers& layers, const PinholeCamera& camera) {
-    ViewDepth view{camera, layers.depth};
+  static ViewDepth countable(const DepthLayers& layers, const Image& depth, const PinholeCamera& camera) {
+    ViewDepth view{camera, depth};
     for (std::size_t i = 0; i < view.depth.data().size(); ++i)
       if (!(layers.opacity.data()[i] > kHasDepth)) view.depth.data()[i] = 0;
     return view;
@@ -264,6 +287,8 @@ class Measurement {
       add_points("depth points that " + std::to_string(options_.views_agree) + " views agree on",
                  one_point_a_cell(depth_points(estimates_, agreeing, threads_), cell));
     }
+    if (!refined_.empty())
+      add_points("refined depth points", one_point_a_cell(depth_points(refined_, {}, threads_), cell));
     saved_ =
         saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold), kConfident);
     add_points("voxels", saved_.centres);
@@ -382,7 +407,7 @@ class Measurement {
   int threads_;
   RunMeasures out_;
   std::vector<Eigen::Vector3d> samples_, seen_;  ///< of the true surface; those that two views see
-  std::vector<ViewDepth> estimates_;
+  std::vector<ViewDepth> estimates_, refined_;
   SavedVoxels saved_;
   std::optional<SurfaceDistance> truth_distance_;
   std::optional<RunRenderer> renderer_;

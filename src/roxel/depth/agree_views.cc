@@ -1,6 +1,7 @@
 #include "roxel/depth/agree_views.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -13,14 +14,18 @@ namespace {
 constexpr double kAgreeSigmas = 3;       ///< deviations within which two views speak of one surface
 constexpr double kFarthest = 0.02;       ///< relative difference of depth that is another surface
 constexpr double kMedianSigma = 0.6745;  ///< median of |x| of a standard Gaussian
-constexpr double kShared =
-    0.3;                     ///< share of a view's error variance that views of one surface have in common
-constexpr int kBins = 2000;  ///< of differences over deviations,
-constexpr double kBinsPerSigma = 50;  ///< up to 40
+constexpr double kMostShared = 0.5;      ///< of a variance, where a pixel is asked how views differ
+constexpr int kRoughStep = 3;            ///< pixels to the neighbours that are asked how rough the map is
+constexpr double kRoughness = 1;         ///< deviations that the median difference from them stands for
+constexpr int kBins = 2000;              ///< of differences over deviations,
+constexpr double kBinsPerSigma = 50;     ///< up to 40
 
 /// What another view says of the inverse depth along a ray.
 struct Opinion {
-  double w = 0, variance = 0;
+  double w = 0;
+  double own = 0;     ///< variance that is this view's alone
+  double shared = 0;  ///< and that views have in common
+  double total() const { return own + shared; }
 };
 
 /// The plane of the pixel that the ray's surface falls on there, met by the ray.
@@ -40,7 +45,8 @@ std::optional<Opinion> ask(const AgreeingView& other, const Eigen::Vector3d& pix
   const double facing = 1 - p.dot(other.warp.parallax);
   if (std::abs(facing) < 0.05) return {};
   const double scale = h.z() / facing;  // d w / d (inverse depth there)
-  const Opinion opinion{p.dot(far) / facing, scale * scale * variance};
+  const double shared = std::min<double>(variance, *other.view->shared.pixel(x, y));
+  const Opinion opinion{p.dot(far) / facing, scale * scale * (variance - shared), scale * scale * shared};
   if (!(std::abs(opinion.w - w) < kFarthest * w)) return {};
   return opinion;
 }
@@ -77,11 +83,12 @@ class Agreement {
       for (int x = 0; x < own_.planes.width; ++x) {
         const PixelPlane& plane = own_.planes.at(x, y);
         if (plane.empty()) continue;
+        const Opinion mine = own_opinion(x, y);
+        if (mine.shared > kMostShared * mine.total()) continue;
         for (const AgreeingView& other : others_) {
           const auto opinion = ask(other, {x + 0.5, y + 0.5, 1}, plane.w);
-          if (!opinion) continue;
-          const double off =
-              std::abs(opinion->w - plane.w) / std::sqrt(*own_.variance.pixel(x, y) + opinion->variance);
+          if (!opinion || opinion->shared > kMostShared * opinion->total()) continue;
+          const double off = std::abs(opinion->w - plane.w) / std::sqrt(mine.own + opinion->own);
           ++rows[y][static_cast<std::size_t>(std::min(off * kBinsPerSigma, kBins - 1.0))];
         }
       }
@@ -100,27 +107,58 @@ class Agreement {
   void join_pixel(int x, int y, double stretch, AgreedView& out) const {
     PixelPlane& plane = out.planes.at(x, y);
     if (plane.empty()) return;
-    const double w = plane.w, variance = stretch * stretch * *own_.variance.pixel(x, y);
-    double weight = 1 / variance, first = 0, second = 0;
+    const double w = plane.w;
+    Opinion mine = own_opinion(x, y);
+    mine.own *= stretch * stretch;
+    double weight = 1 / mine.total(), first = 0, second = 0;
+    double shared = weight * mine.shared, own = weight * mine.own;
     int agreeing = 0;
     for (const AgreeingView& other : others_) {
       auto opinion = ask(other, {x + 0.5, y + 0.5, 1}, w);
       if (!opinion) continue;
-      opinion->variance *= stretch * stretch;
-      const double off = opinion->w - w;
-      if (off * off > kAgreeSigmas * kAgreeSigmas * (variance + opinion->variance)) continue;
-      weight += 1 / opinion->variance;
-      first += off / opinion->variance;
-      second += off * off / opinion->variance;
+      opinion->own *= stretch * stretch;
+      const double off = opinion->w - w, k = 1 / opinion->total();
+      if (off * off > kAgreeSigmas * kAgreeSigmas * (mine.total() + opinion->total())) continue;
+      weight += k;
+      first += k * off;
+      second += k * off * off;
+      shared += k * opinion->shared;
+      own += k * opinion->own;
       ++agreeing;
     }
     *out.views.pixel(x, y) = static_cast<float>(agreeing);
     const double mean = first / weight;
-    // What all views share does not shrink with their number.
     const double chi2 = agreeing > 0 ? std::max(1.0, (second - mean * first) / agreeing) : 1;
-    const double single = (1 + agreeing) / weight;
     plane.w = static_cast<float>(w + mean);
-    *out.variance.pixel(x, y) = static_cast<float>(chi2 * (kShared * single + (1 - kShared) / weight));
+    // Views are made from the same few photographs: what is a view's own is not taken to shrink with their
+    // number.
+    const double rough = kRoughness * roughness(x, y);
+    *out.variance.pixel(x, y) = static_cast<float>(chi2 * (shared + own) / weight + rough * rough);
+  }
+
+  /// What neighbours' planes say of this pixel differs by so much from its own: where patches err, and where
+  /// the surface is no plane, they do so each in its way.
+  double roughness(int x, int y) const {
+    const PixelPlane& plane = own_.planes.at(x, y);
+    std::array<float, 8> differences;
+    int count = 0;
+    for (int dy = -kRoughStep; dy <= kRoughStep; dy += kRoughStep)
+      for (int dx = -kRoughStep; dx <= kRoughStep; dx += kRoughStep) {
+        const int nx = x + dx, ny = y + dy;
+        if ((dx == 0 && dy == 0) || nx < 0 || ny < 0 || nx >= own_.planes.width || ny >= own_.planes.height)
+          continue;
+        const PixelPlane& other = own_.planes.at(nx, ny);
+        if (other.empty()) continue;
+        differences[count++] = std::abs(other.at(static_cast<float>(-dx), static_cast<float>(-dy)) - plane.w);
+      }
+    if (count == 0) return 0;
+    std::nth_element(differences.begin(), differences.begin() + count / 2, differences.begin() + count);
+    return differences[count / 2];
+  }
+
+  Opinion own_opinion(int x, int y) const {
+    const double variance = *own_.variance.pixel(x, y), shared = *own_.shared.pixel(x, y);
+    return {own_.planes.at(x, y).w, std::max(0.0, variance - shared), std::min(variance, shared)};
   }
 
   const RefinedView& own_;

@@ -16,6 +16,7 @@ namespace roxel {
 namespace {
 
 constexpr std::size_t kCachedBytes = std::size_t{1} << 30;  ///< of views beside the one that is worked on
+constexpr double kMostVoxels = 1.5;                         ///< of a depth's deviation, as refinement sees it
 constexpr int kSampleStride = 8;  ///< pixels between samples that sources are chosen by
 
 class Clock {
@@ -147,7 +148,7 @@ class DepthStage {
       sources[v] = refine_one(v, views);
       report("refining depth", 5);
     }
-    ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 20);
+    ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 24);
     for (int v = 0; v < count_; ++v) {
       agree_one(v, sources[v], refined);
       report("refining depth", 1);
@@ -163,6 +164,8 @@ class DepthStage {
   MatchView match_view(int v) const {
     const DepthLayers layers = files_.read(v);
     MatchView view{dataset_.views[v].camera, luma_of(v), {}, layers.variance};
+    const float most = static_cast<float>(kMostVoxels * kMostVoxels * scene_.voxel_size * scene_.voxel_size);
+    for (float& variance : view.variance.data()) variance = std::min(variance, most);
     view.depth = layers.depth_bp.empty() ? believed_depth(layers) : layers.depth_bp;
     return view;
   }
@@ -179,14 +182,29 @@ class DepthStage {
     RefineOptions options;
     options.patch.radius = options_.refine_radius;
     options.patch.noise = options_.refine_noise;
+    options.patch.gap = scene_.voxel_size;
+    options.pixel_sigma = options_.refine_pixel_sigma;
     options.sources = options_.refine_views;
     options.iterations = options_.refine_rounds;
     options.sigmas = options_.refine_sigmas;
     options.seed = options_.refine_seed;
-    const RefinedView refined = refine_view(*own, pointers, start, options, context_);
+    RefinedView refined = refine_view(*own, pointers, start, options, context_);
+    doubt_unmatched(v, refined);
     for (const float c : refined.correlation.data()) figures_.matched_pixels += c > 0;
     files_.keep(v, refined);
     return sources;
+  }
+
+  /// Where photographs say nothing, the volume's own variance stays.
+  void doubt_unmatched(int v, RefinedView& refined) const {
+    const DepthLayers layers = files_.read(v);
+    for (std::size_t i = 0; i < refined.planes.planes.size(); ++i) {
+      const float w = refined.planes.planes[i].w;
+      if (w <= 0 || refined.correlation.data()[i] > 0) continue;
+      const float variance =
+          layers.depth.data()[i] > 0 ? layers.variance.data()[i] : layers.variance_bp.data()[i];
+      refined.variance.data()[i] = refined.shared.data()[i] = variance * w * w * w * w;
+    }
   }
 
   void agree_one(int v, const std::vector<int>& sources, ViewCache<RefinedView>& refined) {
@@ -281,6 +299,10 @@ OptionTable<DepthStageOptions> make_table() {
       .help("Deviation of the images that patches are granted")
       .unit("of white, at middle grey")
       .range(1e-5, 1);
+  table.add("refine-pixel-sigma", &Options::refine_pixel_sigma)
+      .help("Deviation by which calibration puts a point beside where it is in a photograph")
+      .unit("pixels")
+      .range(0, 10);
   table.add("refine-seed", &Options::refine_seed).help("Draws other random planes").at_least(0);
   table.add("refine-agree", &Options::refine_agree).help("Join what several views say of the same surface");
   return table;
@@ -324,6 +346,16 @@ std::vector<int> choose_sources(const Dataset& dataset, int view_idx, const Imag
   for (const auto& [score, s] : scores)
     if (static_cast<int>(chosen.size()) < most) chosen.push_back(s);
   return chosen;
+}
+
+void DepthStageFigures::add(const DepthStageFigures& other) {
+  propagation.add(other.propagation);
+  refined_pixels += other.refined_pixels;
+  matched_pixels += other.matched_pixels;
+  agreed_pixels += other.agreed_pixels;
+  pixels = std::max(pixels, other.pixels);
+  propagate_seconds += other.propagate_seconds;
+  refine_seconds += other.refine_seconds;
 }
 
 DepthStageFigures run_depth_stage(const Dataset& dataset, const PhotographLoader& load,

@@ -27,6 +27,7 @@ struct DepthStageOptions {
   int refine_radius = 3;
   double refine_sigmas = 4;
   double refine_noise = 0.006;
+  double refine_pixel_sigma = 0.05;
   std::int64_t refine_seed = 1;
   bool refine_agree = true;
 };
@@ -49,6 +50,10 @@ struct DepthStageFigures {
   std::int64_t agreed_pixels = 0;   ///< that another view agrees with
   double pixels = 0;                ///< of all images
   double propagate_seconds = 0, refine_seconds = 0;
+  std::int64_t propagate_peak_bytes = 0, refine_peak_bytes = 0;  ///< of the process; filled by who runs it
+
+  /// Of another part of the stage, over the same views.
+  void add(const DepthStageFigures& other);
 };
 
 /// What depth maps are made of, beside the photographs.

@@ -11,8 +11,7 @@ namespace roxel {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kLikeColor = 0.15f;  ///< difference of luma at which a sample counts e^-1/2
-constexpr float kGapShare = 0.02f;   ///< least relative gap in depth that is another surface
+constexpr float kLikeColor = 0.1f;  ///< difference of luma at which a sample counts e^-1/2
 
 /// A homography's numerators and denominator about the patch's middle.
 struct Steps {
@@ -201,6 +200,7 @@ Patch::Patch(const Image& luma, const PlaneMap& surface, int x, int y, const Pat
   const float middle = *luma.pixel(x, y);
   if (!std::isfinite(middle)) return;
   const PixelPlane& own = surface.at(x, y);
+  const float gap = static_cast<float>(options.gap) * own.w * own.w;
   const float spread = 0.5f / static_cast<float>(radius_ * radius_);
   double sum = 0, squares = 0, mean = 0;
   for (int dy = -radius_; dy <= radius_; ++dy)
@@ -215,7 +215,7 @@ Patch::Patch(const Image& luma, const PlaneMap& surface, int x, int y, const Pat
         weight = std::exp(-0.5f * off * off - spread * static_cast<float>(dx * dx + dy * dy));
         const PixelPlane& other = surface.at(x + dx, y + dy);
         const float expected = own.at(static_cast<float>(dx), static_cast<float>(dy));
-        if (other.empty() || std::abs(other.w - expected) > kGapShare * own.w) weight = 0;
+        if (other.empty() || std::abs(other.w - expected) > gap) weight = 0;
       }
       weight_[count_] = weight;
       value_[count_] = value;

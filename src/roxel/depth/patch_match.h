@@ -32,6 +32,7 @@ struct PatchSource {
 struct PatchOptions {
   int radius = 3;        ///< pixels
   double noise = 0.006;  ///< deviation of the luma that is always granted
+  double gap = 1;        ///< depth between a pixel and the plane that makes it another surface, world units
 };
 
 /// The patch of one pixel in the reference, ready to be compared. Samples are weighted by likeness in colour

@@ -14,9 +14,12 @@ namespace roxel {
 namespace {
 
 constexpr float kNoCost = std::numeric_limits<float>::infinity();
-constexpr float kWorstMatch = 0.8f;      ///< 1 - correlation beyond which views are equally wrong
-constexpr double kModelNoise = 0.02;     ///< share of a patch's variance that no plane explains
-constexpr double kIndependent = 0.25;    ///< share of a patch's samples that err independently
+constexpr float kWorstMatch = 0.8f;          ///< 1 - correlation beyond which views are equally wrong
+constexpr double kModelNoise = 0.02;         ///< share of a patch's variance that no plane explains
+constexpr double kIndependent = 0.25;        ///< share of a patch's samples that err independently
+constexpr double kIndependentErrors = 0.25;  ///< the same, for how far a depth may be off
+constexpr double kVolumeStretch =
+    2;  ///< of the variance that rests on the volume: its errors are alike nearby
 constexpr double kSlopeSigma = 0.6;      ///< tangent by which the volume's normals err
 constexpr double kSteepest = 6;          ///< tangent of the steepest plane
 constexpr float kLeastAgreement = 0.4f;  ///< correlation of a view that counts in the least squares
@@ -80,7 +83,8 @@ class ViewRefinement {
     for (int round = 0; round < options_.iterations; ++round)
       for (int color = 0; color < 2; ++color)
         for_each_pixel(color, [&](int x, int y, std::size_t i) { improve(x, y, i, round); });
-    RefinedView out{PlaneMap(width_, height_), Image(width_, height_, 1), Image(width_, height_, 1)};
+    RefinedView out{PlaneMap(width_, height_), Image(width_, height_, 1), Image(width_, height_, 1),
+                    Image(width_, height_, 1)};
     for_each_pixel(-1, [&](int x, int y, std::size_t i) { finish(x, y, i, out); });
     return out;
   }
@@ -242,7 +246,7 @@ class ViewRefinement {
 
   Joint join(const Patch& patch, const PixelPlane& plane, std::uint32_t agreeing, std::size_t i) const {
     Joint joint;
-    const double samples = kIndependent * patch.sample_count();
+    const double samples = kIndependentErrors * patch.sample_count();
     const double floor = options_.patch.noise * options_.patch.noise;
     double weights = 0, firsts = 0, seconds = 0;
     for (std::uint32_t left = agreeing; left != 0; left &= left - 1) {
@@ -271,9 +275,23 @@ class ViewRefinement {
     return joint;
   }
 
+  /// Of w, where points are off by pixel_sigma in each view.
+  double calibration_variance(int x, int y, const PixelPlane& plane, std::uint32_t agreeing) const {
+    double squares = 0;
+    int count = 0;
+    for (std::uint32_t left = agreeing; left != 0; left &= left - 1, ++count) {
+      const PatchWarp& warp = sources_[std::countr_zero(left)].warp;
+      const Eigen::Vector3d& m = warp.parallax;
+      const Eigen::Vector3d h = warp.from_pixel * Eigen::Vector3d(x + 0.5, y + 0.5, 1) + plane.w * m;
+      squares += (m.head<2>() - h.head<2>() / h.z() * m.z()).squaredNorm() / (h.z() * h.z());
+    }
+    return squares > 0 ? options_.pixel_sigma * options_.pixel_sigma * count / squares : 0;
+  }
+
   void finish(int x, int y, std::size_t i, RefinedView& out) const {
     Hypothesis best = best_[i];
-    double variance = static_cast<double>(sigma_w(i)) * sigma_w(i);
+    const double prior = static_cast<double>(sigma_w(i)) * sigma_w(i);
+    double variance = prior, shared = prior;
     if (std::isfinite(best.cost) && best.agreeing != 0) {
       const Patch patch = patch_at(x, y);
       const std::uint32_t agreeing = best.agreeing;
@@ -291,11 +309,16 @@ class ViewRefinement {
       const Hypothesis polished = judge(patch, plane, i);
       if (polished.cost <= best.cost * 1.02f + 0.1f) best = polished;
       const Joint joint = join(patch, best.plane, agreeing, i);
-      variance = joint.a.inverse()(0, 0) * std::max(1.0, joint.chi2);
+      const double matched = joint.a.inverse()(0, 0);
+      const double from_volume = std::min(1.0, matched / prior);
+      const double calibration = calibration_variance(x, y, best.plane, agreeing);
+      shared = std::min(prior, kVolumeStretch * from_volume * matched) + calibration;
+      variance = (1 - from_volume) * matched * std::max(1.0, joint.chi2) + shared;
       out.correlation.data()[i] = std::max(0.0f, best.correlation);
     }
     out.planes.planes[i] = best.plane;
     out.variance.data()[i] = static_cast<float>(variance);
+    out.shared.data()[i] = static_cast<float>(shared);
   }
 
   const MatchView& view_;

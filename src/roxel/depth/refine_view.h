@@ -20,9 +20,10 @@ struct MatchView {
 
 struct RefineOptions {
   PatchOptions patch;
-  int sources = 8;     ///< views that a patch is looked for in, at most 32
-  int iterations = 3;  ///< rounds of propagation over the view
-  double sigmas = 4;   ///< deviations that a depth may move by
+  int sources = 8;            ///< views that a patch is looked for in, at most 32
+  int iterations = 3;         ///< rounds of propagation over the view
+  double sigmas = 4;          ///< deviations that a depth may move by
+  double pixel_sigma = 0.05;  ///< pixels by which calibration errs, alike in all views
   std::int64_t seed = 1;
 };
 
@@ -31,6 +32,7 @@ struct RefineOptions {
 struct RefinedView {
   PlaneMap planes;
   Image variance;     ///< of w
+  Image shared;       ///< the part of it that other views have in common: the volume's say, and calibration
   Image correlation;  ///< mean over the views that agree best; 0 = the photographs say nothing
 };
 

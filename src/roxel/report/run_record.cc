@@ -124,7 +124,9 @@ ordered_json to_json(const RunRecord& record) {
           {"passes", list(summary.passes, pass_json)},
           {"stages", list(summary.stages,
                           [](const StageRecord& s) {
-                            return ordered_json{{"name", s.name}, {"seconds", s.seconds}};
+                            return ordered_json{{"name", s.name},
+                                                {"seconds", s.seconds},
+                                                {"peak_memory_bytes", s.peak_memory_bytes}};
                           })},
           {"seconds", summary.seconds},
           {"threads", record.threads},
