@@ -2,8 +2,6 @@
 
 #include <cmath>
 #include <limits>
-#include <map>
-#include <mutex>
 
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
@@ -183,23 +181,6 @@ class Measurement {
       out.methods.push_back({method, depth_accuracy({depth.data(), variance.data(), estimate.opacity.data()},
                                                     truth.data(), options)});
     };
-    if (getenv("CALIB") && !estimate.depth_refined.empty()) {
-      static std::mutex mu;
-      static std::map<int, std::vector<float>> bins;
-      std::lock_guard lock(mu);
-      for (std::size_t i = 0; i < truth.data().size(); ++i)
-        if (truth.data()[i] > 0 && estimate.depth_refined.data()[i] > 0) {
-          float s = std::sqrt(estimate.variance_refined.data()[i]);
-          bins[int(std::floor(2 * std::log2(s / options.voxel_size)))].push_back(
-              std::abs(estimate.depth_refined.data()[i] - truth.data()[i]) / s);
-        }
-      if (name == source_.view_names.back())
-        for (auto& [b, v] : bins) {
-          std::sort(v.begin(), v.end());
-          fprintf(stderr, "sigma %.4f n %zu p50 %.2f p68 %.2f p95 %.2f\n", std::exp2(b / 2.0 + .25), v.size(),
-                  v[v.size() / 2], v[v.size() * 68 / 100], v[v.size() * 95 / 100]);
-        }
-    }
     add("volume", estimate.depth, estimate.variance);
     add("bp", estimate.depth_bp, estimate.variance_bp);
     add("refined", estimate.depth_refined, estimate.variance_refined);

@@ -14,9 +14,10 @@ namespace {
 constexpr double kAgreeSigmas = 3;       ///< deviations within which two views speak of one surface
 constexpr double kFarthest = 0.02;       ///< relative difference of depth that is another surface
 constexpr double kMedianSigma = 0.6745;  ///< median of |x| of a standard Gaussian
+constexpr double kShared = 0.5;          ///< of a view's own variance, what is left when several are averaged
 constexpr double kMostShared = 0.5;      ///< of a variance, where a pixel is asked how views differ
 constexpr int kRoughStep = 3;            ///< pixels to the neighbours that are asked how rough the map is
-constexpr double kRoughness = 1;         ///< deviations that the median difference from them stands for
+constexpr double kRoughness = 0.7;       ///< deviations that the median difference from them stands for
 constexpr int kBins = 2000;              ///< of differences over deviations,
 constexpr double kBinsPerSigma = 50;     ///< up to 40
 
@@ -130,10 +131,9 @@ class Agreement {
     const double mean = first / weight;
     const double chi2 = agreeing > 0 ? std::max(1.0, (second - mean * first) / agreeing) : 1;
     plane.w = static_cast<float>(w + mean);
-    // Views are made from the same few photographs: what is a view's own is not taken to shrink with their
-    // number.
+    // Views are made from the same few photographs: of what is a view's own, a part goes with their number.
     const double rough = kRoughness * roughness(x, y);
-    *out.variance.pixel(x, y) = static_cast<float>(chi2 * (shared + own) / weight + rough * rough);
+    *out.variance.pixel(x, y) = static_cast<float>(chi2 * (shared + kShared * own) / weight + rough * rough);
   }
 
   /// What neighbours' planes say of this pixel differs by so much from its own: where patches err, and where

@@ -16,7 +16,7 @@ namespace roxel {
 namespace {
 
 constexpr std::size_t kCachedBytes = std::size_t{1} << 30;  ///< of views beside the one that is worked on
-constexpr double kMostVoxels = 1.5;                         ///< of a depth's deviation, as refinement sees it
+constexpr double kMostVoxels = 0.8;                         ///< of a depth's deviation, as refinement sees it
 constexpr int kSampleStride = 8;  ///< pixels between samples that sources are chosen by
 
 class Clock {
@@ -142,7 +142,7 @@ class DepthStage {
 
   void refine_all() {
     const Clock clock;
-    ViewCache<MatchView> views([&](int v) { return match_view(v); }, 12);
+    ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24);
     std::vector<std::vector<int>> sources(count_);
     for (int v = 0; v < count_; ++v) {
       sources[v] = refine_one(v, views);
@@ -163,7 +163,12 @@ class DepthStage {
 
   MatchView match_view(int v) const {
     const DepthLayers layers = files_.read(v);
-    MatchView view{dataset_.views[v].camera, luma_of(v), {}, layers.variance};
+    const Photograph photo = load_(dataset_.views[v]);
+    MatchView view{dataset_.views[v].camera,
+                   matching_luma(photo.rgb, scene_.white, photo.valid),
+                   matching_color(photo.rgb, scene_.white),
+                   {},
+                   layers.variance};
     const float most = static_cast<float>(kMostVoxels * kMostVoxels * scene_.voxel_size * scene_.voxel_size);
     for (float& variance : view.variance.data()) variance = std::min(variance, most);
     view.depth = layers.depth_bp.empty() ? believed_depth(layers) : layers.depth_bp;

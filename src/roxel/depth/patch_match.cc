@@ -11,7 +11,7 @@ namespace roxel {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kLikeColor = 0.1f;  ///< difference of luma at which a sample counts e^-1/2
+constexpr float kLikeColor = 0.12f;  ///< difference of colours at which a sample counts e^-1/2
 
 /// A homography's numerators and denominator about the patch's middle.
 struct Steps {
@@ -175,14 +175,32 @@ ROXEL_KERNEL Moments moments_of(const CubicSamples& in, const float* reference, 
   return m;
 }
 
+/// Square of how far two pixels' colours are apart.
+float unlikeness(const Image& luma, const Image& color, int x, int y, int nx, int ny) {
+  const Image& image = color.empty() ? luma : color;
+  const float *a = image.pixel(x, y), *b = image.pixel(nx, ny);
+  float sum = 0;
+  for (int c = 0; c < image.channels(); ++c) sum += (a[c] - b[c]) * (a[c] - b[c]);
+  return sum;
+}
+
+/// Steps look alike in light and shade.
+float perceived(double light) { return static_cast<float>(std::cbrt(std::max(0.0, light) + 1e-3) - 0.1); }
+
 }  // namespace
+
+Image matching_color(const Image& rgb, double white) {
+  Image color(rgb.width(), rgb.height(), 3);
+  for (std::size_t i = 0; i < color.data().size(); ++i) color.data()[i] = perceived(rgb.data()[i] / white);
+  return color;
+}
 
 Image matching_luma(const Image& rgb, double white, const Mask& valid) {
   Image luma(rgb.width(), rgb.height(), 1);
   for (std::size_t i = 0; i < luma.data().size(); ++i) {
     const float* p = rgb.data().data() + 3 * i;
     const double y = (0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]) / white;
-    luma.data()[i] = static_cast<float>(std::cbrt(std::max(0.0, y) + 1e-3) - 0.1);
+    luma.data()[i] = perceived(y);
     if (!valid.empty() && valid.data()[i] == 0) luma.data()[i] = kNaN;
   }
   return luma;
@@ -195,7 +213,8 @@ PatchWarp::PatchWarp(const PinholeCamera& reference, const PinholeCamera& source
   parallax = k * source.pose.rotation * (reference.pose.centre - source.pose.centre);
 }
 
-Patch::Patch(const Image& luma, const PlaneMap& surface, int x, int y, const PatchOptions& options)
+Patch::Patch(const Image& luma, const Image& color, const PlaneMap& surface, int x, int y,
+             const PatchOptions& options)
     : u_(x), v_(y), radius_(options.radius), noise_variance_(options.noise * options.noise) {
   const float middle = *luma.pixel(x, y);
   if (!std::isfinite(middle)) return;
@@ -211,8 +230,8 @@ Patch::Patch(const Image& luma, const PlaneMap& surface, int x, int y, const Pat
       if (x + dx >= 0 && y + dy >= 0 && x + dx < luma.width() && y + dy < luma.height() &&
           std::isfinite(*luma.pixel(x + dx, y + dy))) {
         value = *luma.pixel(x + dx, y + dy);
-        const float off = (value - middle) / kLikeColor;
-        weight = std::exp(-0.5f * off * off - spread * static_cast<float>(dx * dx + dy * dy));
+        const float off = unlikeness(luma, color, x, y, x + dx, y + dy) / (kLikeColor * kLikeColor);
+        weight = std::exp(-0.5f * off - spread * static_cast<float>(dx * dx + dy * dy));
         const PixelPlane& other = surface.at(x + dx, y + dy);
         const float expected = own.at(static_cast<float>(dx), static_cast<float>(dy));
         if (other.empty() || std::abs(other.w - expected) > gap) weight = 0;

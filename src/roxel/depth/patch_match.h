@@ -15,6 +15,9 @@ namespace roxel {
 /// What patches compare: one channel whose steps look alike in light and shade. NaN where nothing is known.
 Image matching_luma(const Image& rgb, double white, const Mask& valid);
 
+/// The same for each of three channels: what tells surfaces apart.
+Image matching_color(const Image& rgb, double white);
+
 /// From a pixel (u, v) of the reference and its inverse depth w to another view: h = from_pixel (u, v, 1) + w
 /// parallax, position h.xy / h.z.
 struct PatchWarp {
@@ -42,8 +45,10 @@ class Patch {
   static constexpr int kMostRadius = 7;
   static constexpr int kMostSamples = 232;  ///< (2 kMostRadius + 1)^2, up to whole groups of eight
 
-  /// `surface`: 0 where a pixel is known to show another surface or none; empty = all 1.
-  Patch(const Image& luma, const PlaneMap& surface, int x, int y, const PatchOptions& options);
+  /// `color`: of the same size as `luma`, or empty; then likeness is that of luma. `surface`: planes that
+  /// pixels are taken to lie on; those that are off the patch's own, or have none, are not part of it.
+  Patch(const Image& luma, const Image& color, const PlaneMap& surface, int x, int y,
+        const PatchOptions& options);
 
   /// Whether there is enough to compare.
   bool usable() const { return usable_; }

@@ -30,7 +30,7 @@ struct SlantedPlane {
 
   /// `light`: gain of the photograph. Depth is off by `error` plus `ripple` from pixel to pixel.
   static MatchView view(double x, double y, double light, double error, double ripple) {
-    MatchView out{camera(x, y), Image(72, 56, 1), Image(72, 56, 1), Image(72, 56, 1, 0.0f)};
+    MatchView out{camera(x, y), Image(72, 56, 1), {}, Image(72, 56, 1), Image(72, 56, 1, 0.0f)};
     for (int v = 0; v < 56; ++v)
       for (int u = 0; u < 72; ++u) {
         const Ray ray = out.camera.ray(u + 0.5, v + 0.5);

@@ -19,7 +19,7 @@ constexpr double kModelNoise = 0.02;         ///< share of a patch's variance th
 constexpr double kIndependent = 0.25;        ///< share of a patch's samples that err independently
 constexpr double kIndependentErrors = 0.25;  ///< the same, for how far a depth may be off
 constexpr double kVolumeStretch =
-    2;  ///< of the variance that rests on the volume: its errors are alike nearby
+    1.5;  ///< of the variance that rests on the volume: its errors are alike nearby
 constexpr double kSlopeSigma = 0.6;      ///< tangent by which the volume's normals err
 constexpr double kSteepest = 6;          ///< tangent of the steepest plane
 constexpr float kLeastAgreement = 0.4f;  ///< correlation of a view that counts in the least squares
@@ -108,9 +108,9 @@ class ViewRefinement {
     return std::max(1e-6f * w, std::sqrt(view_.variance.data()[i]) * w * w);
   }
 
-  /// The sources that see the pixel's surface, by their own depth maps.
-  std::uint32_t seen_by(int x, int y, std::size_t i) const {
-    const PixelPlane& plane = start_.planes[i];
+  /// The sources that see the pixel's surface, by their own depth maps; `variance` of the depth besides
+  /// theirs.
+  std::uint32_t seen_by(int x, int y, const PixelPlane& plane, float variance) const {
     std::uint32_t seen = 0;
     for (std::size_t s = 0; s < sources_.size(); ++s) {
       const PatchWarp& warp = sources_[s].warp;
@@ -127,7 +127,7 @@ class ViewRefinement {
           const int sx = static_cast<int>(u) + dx, sy = static_cast<int>(v) + dy;
           const float other = *source.depth.pixel(sx, sy);
           if (!(other > 0)) continue;
-          const double spread = view_.variance.data()[i] + *source.variance.pixel(sx, sy);
+          const double spread = variance + *source.variance.pixel(sx, sy);
           same = (z - other) * (z - other) < 9 * spread;
         }
       if (same) seen |= 1u << s;
@@ -173,11 +173,11 @@ class ViewRefinement {
                               (noise / (patch.variance() + 1e-12) + kModelNoise));
   }
 
-  Patch patch_at(int x, int y) const { return Patch(view_.luma, start_, x, y, options_.patch); }
+  Patch patch_at(int x, int y) const { return Patch(view_.luma, view_.color, start_, x, y, options_.patch); }
 
   void begin(int x, int y, std::size_t i) {
     best_[i].plane = start_.planes[i];
-    visible_[i] = seen_by(x, y, i);
+    visible_[i] = seen_by(x, y, start_.planes[i], view_.variance.data()[i]);
     if (visible_[i] == 0) return;
     const Patch patch = patch_at(x, y);
     if (patch.usable()) {
@@ -275,6 +275,12 @@ class ViewRefinement {
     return joint;
   }
 
+  /// Whether the depth maps of other views speak for where the pixel was and against where it went.
+  bool contradicted(int x, int y, std::size_t i, const PixelPlane& plane) const {
+    const auto views = [&](const PixelPlane& p) { return std::popcount(seen_by(x, y, p, 0)); };
+    return 2 * views(plane) < views(start_.planes[i]);
+  }
+
   /// Of w, where points are off by pixel_sigma in each view.
   double calibration_variance(int x, int y, const PixelPlane& plane, std::uint32_t agreeing) const {
     double squares = 0;
@@ -308,6 +314,11 @@ class ViewRefinement {
       }
       const Hypothesis polished = judge(patch, plane, i);
       if (polished.cost <= best.cost * 1.02f + 0.1f) best = polished;
+      if (contradicted(x, y, i, best.plane)) best.plane = start_.planes[i], best.correlation = 0;
+    }
+    if (best.correlation > 0) {
+      const Patch patch = patch_at(x, y);
+      const std::uint32_t agreeing = best.agreeing;
       const Joint joint = join(patch, best.plane, agreeing, i);
       const double matched = joint.a.inverse()(0, 0);
       const double from_volume = std::min(1.0, matched / prior);

@@ -287,6 +287,29 @@ class Page {
       rows[1].push_back(percent(value, 2));
     }
     out_ += "<h3>Depth</h3>\n" + table(rows);
+    if (m.depth_methods.size() > 1) depth_methods(m.depth_methods);
+  }
+
+  /// The same pixels before and after belief propagation and refinement.
+  void depth_methods(const std::vector<NamedDepthAccuracy>& methods) {
+    std::vector<std::vector<std::string>> rows{{"depth from"}};
+    for (const double t : methods.front().accuracy.thresholds)
+      rows[0].push_back("within " + short_number(t) + " voxels");
+    for (const char* head : {"bias, voxels", "median error, voxels", "in 68 % interval", "in 95 % interval",
+                             "median sigma, voxels", "log loss"})
+      rows[0].push_back(head);
+    for (const auto& [name, a] : methods) {
+      std::vector<std::string> row{name};
+      for (std::size_t i = 0; i < a.thresholds.size(); ++i) row.push_back(percent(a.share_within(i), 2));
+      row.push_back(formatted("%+.3f", a.bias_voxels()));
+      row.push_back(formatted("%.3f", a.median_error_voxels()));
+      row.push_back(percent(a.share_within_sigma(1), 1));
+      row.push_back(percent(a.share_within_sigma(1.96), 1));
+      row.push_back(formatted("%.3f", a.median_sigma_voxels()));
+      row.push_back(formatted("%.3f", a.mean_log_loss()));
+      rows.push_back(row);
+    }
+    out_ += table(rows);
   }
 
   void quality_table(const char* title, const std::vector<NamedImageQuality>& list) {
