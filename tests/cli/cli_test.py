@@ -304,7 +304,7 @@ class Options(Case):
                 self.assertNotEqual(known[key], changed)
 
     def result(self, arguments):
-        out, summary = self.reconstruct("run", *arguments)
+        out, summary = self.reconstruct("run", "--no-bp", "--no-refine", *arguments)
         # What decides about the photographs' reading is part of the result, too.
         return numbers(summary), summary["dataset"]["format"], digest(out / "voxels.ply")
 
@@ -349,11 +349,11 @@ class Depth(Case):
             self.succeed("depth", out, *arguments, "--quiet")
             self.assertEqual(known, self.maps(out), arguments)
         again = json.loads((out / "summary.json").read_text())
-        self.assertEqual([s["name"] for s in summary["stages"]], [s["name"] for s in again["stages"]])
+        self.assertEqual(sorted(s["name"] for s in summary["stages"]), sorted(s["name"] for s in again["stages"]))
         self.assertEqual(summary["depth"]["refined"]["pixels"], again["depth"]["refined"]["pixels"])
         self.assertLess(again["depth"]["bp"]["mean_variance_after"], again["depth"]["bp"]["mean_variance_before"])
         self.assertGreater(again["depth"]["refined"]["matched_pixels"], 100)
-        self.assertFalse(any(".p" in name.split("/")[0] for name in files_below(out)), files_below(out))
+        self.assertFalse(any(name.startswith(".") for name in files_below(out)), files_below(out))
 
     def test_parts_can_be_left_out_and_leave_nothing_old(self):
         out, summary = self.reconstruct("parts", "--no-bp", "--no-refine", "--no-render")
