@@ -44,6 +44,7 @@ table.text td:first-child { overflow-wrap: normal; }
 figcaption { font-size: .85rem; color: #444; }
 .view { break-inside: avoid; margin: 0 0 1rem; }
 .view .row { display: grid; grid-auto-flow: column; grid-auto-columns: minmax(0, 1fr); gap: .3rem; }
+.view .many { grid-auto-flow: row; grid-template-columns: repeat(5, minmax(0, 1fr)); }
 .view figure { margin: 0; }
 .view img { width: 100%; height: auto; display: block; background: #ddd; }
 .settings { columns: 22rem; font-size: .85rem; font-family: ui-monospace, monospace; }
@@ -51,7 +52,7 @@ figcaption { font-size: .85rem; color: #444; }
 footer { margin-top: 2rem; font-size: .85rem; color: #555; border-top: 1px solid #ccc; padding-top: .4rem; }
 @media (max-width: 40rem) {
   body { padding: .6rem; }
-  .view .row { grid-auto-flow: row; grid-template-columns: repeat(6, minmax(0, 1fr)); }
+  .view .row, .view .many { grid-auto-flow: row; grid-template-columns: repeat(6, minmax(0, 1fr)); }
   .view figure { grid-column: span 3; }
   .view .five figure:nth-child(n+3) { grid-column: span 2; }
   table { font-size: .85rem; }
@@ -348,7 +349,10 @@ class Page {
     for (const ReportView& view : content_.views) {
       out_ += "<div class=\"view\"><h3>" + escape_markup(view.name) + (view.figures.empty() ? "" : ": ") +
               escape_markup(view.figures) + "</h3><div class=\"row" +
-              (view.pictures.size() == 5 ? " five" : "") + "\">\n";
+              (view.pictures.size() == 5  ? " five"
+               : view.pictures.size() > 6 ? " many"
+                                          : "") +
+              "\">\n";
       for (const ReportPicture& picture : view.pictures)
         out_ += "<figure><img src=\"" + picture.uri + "\" alt=\"" +
                 escape_markup(picture.caption + " of " + view.name) + "\"><figcaption>" +
