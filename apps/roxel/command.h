@@ -104,6 +104,7 @@ void add_command(Commands& commands, CommandForm form, OptionTable<S> table,
 void add_info(Commands& commands);
 void add_reconstruct(Commands& commands);
 void add_sky(Commands& commands);
+void add_depth(Commands& commands);
 void add_render(Commands& commands);
 void add_eval(Commands& commands);
 void add_merge(Commands& commands);

@@ -5,6 +5,8 @@
 
 #include "command.h"
 #include "common.h"
+#include "dense_workspace.h"
+#include "eval_source.h"
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 #include "roxel/io/dataset_writer.h"
@@ -16,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class Target { kColmap, kTransforms };
+enum class Target { kColmap, kTransforms, kColmapDense };
 
 struct ConvertOptions {
   Target to = Target::kTransforms;
@@ -27,8 +29,12 @@ struct ConvertOptions {
 OptionTable<ConvertOptions> convert_table() {
   OptionTable<ConvertOptions> table;
   table.group("Converted data set");
-  table.add("to", &ConvertOptions::to, {{"transforms", Target::kTransforms}, {"colmap", Target::kColmap}})
-      .help("Format of the result");
+  table
+      .add("to", &ConvertOptions::to,
+           {{"transforms", Target::kTransforms},
+            {"colmap", Target::kColmap},
+            {"colmap-dense", Target::kColmapDense}})
+      .help("Format of the result; colmap-dense: a run's depth and normals, for stereo_fusion");
   table.include(input_option_table(), &ConvertOptions::input);
   table.include(common_option_table(), &ConvertOptions::common);
   return table;
@@ -59,7 +65,32 @@ void write_view(const fs::path& folder, const PhotographLoader& load, View& view
   view.lens.intrinsics = view.camera.intrinsics;
 }
 
+/// The input is a run.
+int convert_run(const Invocation& invocation, const ConvertOptions& options) {
+  Session session(options.common);
+  const FinishedRun run = read_run(invocation.inputs.front());
+  if (run.file.info.dataset.empty())
+    throw_invalid(run.path.string(), "a run that names no data set", "a run of roxel reconstruct");
+  const Input input = read_input(run.file.info.dataset, input_options_of(run), session);
+  protect_sources(invocation.output, {{run.path}, &input.dataset});
+  const OutputFolder folder(invocation.output);
+  PartialResults results(folder.path());
+  write_dense_workspace(input.dataset, input.load, run.path, results.path(), run.file.info.exposure,
+                        run.file.volume.index(0).frame().voxel_size, session.context());
+  session.context().throw_if_cancelled();
+  results.publish();
+  session.display().clear();
+  const nlohmann::ordered_json json{{"workspace", invocation.output.string()},
+                                    {"images", input.dataset.views.size()}};
+  print_result(options.common,
+               "depth and normals of " + std::to_string(input.dataset.views.size()) + " images written to " +
+                   invocation.output.string() + ", for COLMAP\n",
+               json_text(json));
+  return 0;
+}
+
 int run_convert(const Invocation& invocation, const ConvertOptions& options) {
+  if (options.to == Target::kColmapDense) return convert_run(invocation, options);
   Session session(options.common);
   Input input = read_input(invocation.inputs.front(), options.input, session);
   protect_sources(invocation.output, {{}, &input.dataset});
@@ -93,8 +124,9 @@ int run_convert(const Invocation& invocation, const ConvertOptions& options) {
 }  // namespace
 
 void add_convert(Commands& commands) {
-  CommandForm form{"convert", "Write a data set in another format, with lens distortion undone", "DATASET",
-                   "DATASET"};
+  CommandForm form{"convert",
+                   "Write a data set, or a run's depth, in another format, with lens distortion undone",
+                   "DATASET|RUN", "DATASET"};
   add_command(commands, form, convert_table(), run_convert);
 }
 

@@ -171,12 +171,18 @@ std::vector<ReportView> report_views_of(const EvalSource& source) {
     if (const fs::path file = depth_path(source.run.path, name); fs::is_regular_file(file)) {
       const DepthLayers layers = read_depth(file);
       const Image truth = true_depth_of(source, name);
-      shown.pictures.push_back(
-          report_picture("sigma of depth",
-                         sigma_picture(layers.variance, layers.depth, layers.opacity, source.voxel_size())));
-      if (!truth.empty())
+      const auto show = [&](const std::string& method, const Image& depth, const Image& variance) {
+        if (depth.empty()) return;
         shown.pictures.push_back(report_picture(
-            "depth error", depth_error_picture(layers.depth, layers.opacity, truth, source.voxel_size())));
+            "sigma of depth" + method, sigma_picture(variance, depth, layers.opacity, source.voxel_size())));
+        if (!truth.empty())
+          shown.pictures.push_back(
+              report_picture("depth error" + method,
+                             depth_error_picture(depth, layers.opacity, truth, source.voxel_size())));
+      };
+      show("", layers.depth, layers.variance);
+      show(", after belief propagation", layers.depth_bp, layers.variance_bp);
+      show(", refined", layers.depth_refined, layers.variance_refined);
     }
     if (!shown.pictures.empty()) views.push_back(std::move(shown));
   }

@@ -4,6 +4,8 @@
 #include <cinttypes>
 
 #include "command.h"
+#include "dense_workspace.h"
+#include "depth_files.h"
 #include "describe.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/content_hash.h"
@@ -17,8 +19,12 @@
 namespace roxel::cli {
 namespace {
 
-constexpr double kVolumeShare = 0.85;  ///< of the bar; what is left is for depth and pictures
-constexpr double kVolumeWritten = 0.88;
+constexpr double kVolumeShare = 0.55;  ///< of the bar; what is left is for depth and pictures
+constexpr double kVolumeWritten = 0.57;
+constexpr double kViewsWritten = 0.65;
+constexpr double kDepthRefined = 0.98;
+
+enum class Export { kNone, kColmap };
 
 struct StageSwitches {
   std::optional<std::string> init;
@@ -28,10 +34,12 @@ struct StageSwitches {
   bool render = true;
   bool report = true;
   bool save_surround = false;
+  Export exported = Export::kNone;
 };
 
 struct RunOptions {
   ReconstructOptions reconstruct;
+  DepthStageOptions depth;
   InputOptions input;
   StageSwitches stages;
   CommonOptions common;
@@ -56,6 +64,8 @@ OptionTable<StageSwitches> stage_table() {
   table.add("report", &StageSwitches::report).help("A page to look at: report.html");
   table.add("save-surround", &StageSwitches::save_surround)
       .help("Keep the voxels around the box in volume.vdb");
+  table.add("export", &StageSwitches::exported, {{"none", Export::kNone}, {"colmap", Export::kColmap}})
+      .help("Depth and normals for other programs, too: a COLMAP dense workspace in RUN/colmap");
   return table;
 }
 
@@ -64,6 +74,7 @@ OptionTable<RunOptions> run_table() {
   table.include(input_option_table(), &RunOptions::input);
   table.include(stage_table(), &RunOptions::stages);
   table.include(reconstruct_option_table(), &RunOptions::reconstruct);
+  table.include(depth_option_table(), &RunOptions::depth);
   table.include(common_option_table(), &RunOptions::common);
   return table;
 }
@@ -206,6 +217,8 @@ class Run {
   void write_results(const std::filesystem::path& folder, const std::filesystem::path& results) {
     write_volume_files(results);
     write_views(results);
+    refine_depth(results);
+    export_depth(results);
     session_.context().throw_if_cancelled();
     if (options_.stages.report) write_report(results);
     const std::string json = write_summary(results);
@@ -226,7 +239,7 @@ class Run {
                      static_cast<float>(options_.reconstruct.opacity_threshold),
                      static_cast<float>(options_.reconstruct.confidence_threshold));
     session_.context().throw_if_cancelled();
-    made_.summary.stages.push_back({"write volume", stopwatch_.lap()});
+    made_.summary.stages.push_back({"write volume", stopwatch_.lap(), peak_memory_bytes()});
     report("writing", kVolumeWritten);
   }
 
@@ -236,6 +249,7 @@ class Run {
     stages.depth = options_.stages.depth;
     stages.render = options_.stages.render;
     stages.progress_begin = kVolumeWritten;
+    stages.progress_end = kViewsWritten;
     if (options_.stages.report) writer.keep_for_report(made_.scene.voxel_size);
     for_each_view_result(input_.dataset, input_.load, made_, options_.reconstruct, stages, session_.context(),
                          [&](const ViewResult& result) { writer.write(result); });
@@ -244,13 +258,33 @@ class Run {
     report_views_ = writer.report_pictures();
     reprojection_rms_ = writer.reprojection_rms();
     if (stages.depth || stages.render)
-      made_.summary.stages.push_back({"depth and pictures", stopwatch_.lap()});
+      made_.summary.stages.push_back({"depth and pictures", stopwatch_.lap(), peak_memory_bytes()});
+  }
+
+  /// Belief propagation and refinement of what write_views has written.
+  void refine_depth(const std::filesystem::path& results) {
+    if (!options_.stages.depth || !(options_.depth.bp || options_.depth.refine)) return;
+    refined_ = refine_depth_files(input_.dataset, input_.load, {made_.scene.exposure, made_.scene.voxel_size},
+                                  {results, results}, options_.depth, session_.context(), kViewsWritten,
+                                  kDepthRefined);
+    for (const StageRecord& record : stage_records(*refined_)) made_.summary.stages.push_back(record);
+    for (ReportView& view : report_views_) add_refined_pictures(results, made_.scene.voxel_size, view);
+    stopwatch_.lap();
+  }
+
+  void export_depth(const std::filesystem::path& results) {
+    if (!options_.stages.depth || options_.stages.exported == Export::kNone) return;
+    write_dense_workspace(input_.dataset, input_.load, results, results / "colmap", made_.scene.exposure,
+                          made_.scene.voxel_size, session_.context());
+    made_.summary.stages.push_back({"export", stopwatch_.lap(), peak_memory_bytes()});
   }
 
   nlohmann::ordered_json summary_so_far() {
     made_.summary.seconds = stopwatch_.total();
     made_.summary.peak_memory_bytes = peak_memory_bytes();
-    return to_json(make_record(session_.context().thread_count()));
+    nlohmann::ordered_json json = to_json(make_record(session_.context().thread_count()));
+    if (refined_) json["depth"] = to_json(*refined_);
+    return json;
   }
 
   void write_report(const std::filesystem::path& results) {
@@ -260,7 +294,7 @@ class Run {
       content.sections.push_back(opacity_section(made_.volume, axis, middle[axis]));
     content.opacities = saved_voxels(made_.volume, 0, 0).opacity;
     write_text_atomically(results / "report.html", html_report(content));
-    made_.summary.stages.push_back({"report", stopwatch_.lap()});
+    made_.summary.stages.push_back({"report", stopwatch_.lap(), peak_memory_bytes()});
   }
 
   std::string write_summary(const std::filesystem::path& results) {
@@ -302,6 +336,7 @@ class Run {
 
   std::string brief() const {
     std::string text = made_.summary.brief() + "\n";
+    if (refined_) text += cli::brief(*refined_);
     if (reprojection_rms_) {
       char line[64];
       std::snprintf(line, sizeof line, "reprojection error %.2f %% of full scale\n", *reprojection_rms_);
@@ -329,6 +364,7 @@ class Run {
   Reconstruction made_;
   std::vector<ViewFigures> views_;
   std::vector<ReportView> report_views_;
+  std::optional<DepthStageFigures> refined_;
   std::optional<double> reprojection_rms_;
 };
 

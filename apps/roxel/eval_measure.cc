@@ -29,9 +29,11 @@ constexpr std::size_t kMostColorPixels = 2000000;
 /// One view as far as its files are there.
 struct MeasuredView {
   std::optional<NamedDepthAccuracy> depth;
+  std::vector<NamedDepthAccuracy> methods;  ///< "volume", "bp", "refined"
   std::optional<Reliability> reliability;
   std::optional<NamedImageQuality> quality;
   std::optional<ViewDepth> estimate;  ///< pixels that count alone
+  std::optional<ViewDepth> refined;   ///< the same of the refined depth
 };
 
 std::string size_text(const Image& image) {
@@ -122,15 +124,23 @@ class Measurement {
       views[v] = measure_view(source_.view_names[v]);
     });
     for (MeasuredView& view : views) {
+      for (const NamedDepthAccuracy& method : view.methods) add_method(method);
       if (view.depth) out_.depth.push_back(std::move(*view.depth));
       if (view.quality) out_.images.push_back(std::move(*view.quality));
       if (view.estimate) estimates_.push_back(std::move(*view.estimate));
+      if (view.refined) refined_.push_back(std::move(*view.refined));
       if (!view.reliability) continue;
       if (!out_.opacity_reliability) out_.opacity_reliability.emplace();
       out_.opacity_reliability->add(*view.reliability);
     }
     if (out_.depth.empty()) note_unmatched("depth", "depth map");
     keep_seen_samples();
+  }
+
+  void add_method(const NamedDepthAccuracy& method) {
+    for (NamedDepthAccuracy& known : out_.depth_methods)
+      if (known.name == method.name) return known.accuracy.add(method.accuracy);
+    out_.depth_methods.push_back(method);
   }
 
   /// Truth that is there and goes with nothing of the run.
@@ -157,7 +167,9 @@ class Measurement {
       }
     }
     if (estimate && !truth.empty()) measure_depth(name, *estimate, truth, out);
-    if (estimate && view) out.estimate = countable(*estimate, view->camera);
+    if (estimate && view) out.estimate = countable(*estimate, estimate->depth, view->camera);
+    if (estimate && view && !estimate->depth_refined.empty())
+      out.refined = countable(*estimate, estimate->depth_refined, view->camera);
     if (view) out.quality = measure_render(*view, estimate ? &*estimate : nullptr, truth);
     return out;
   }
@@ -167,14 +179,20 @@ class Measurement {
     DepthAccuracyOptions options;
     options.voxel_size = source_.voxel_size();
     options.distances = options_.depth_within;
-    out.depth = {name,
-                 depth_accuracy({estimate.depth.data(), estimate.variance.data(), estimate.opacity.data()},
-                                truth.data(), options)};
+    const auto add = [&](const char* method, const Image& depth, const Image& variance) {
+      if (depth.empty()) return;
+      out.methods.push_back({method, depth_accuracy({depth.data(), variance.data(), estimate.opacity.data()},
+                                                    truth.data(), options)});
+    };
+    add("volume", estimate.depth, estimate.variance);
+    add("bp", estimate.depth_bp, estimate.variance_bp);
+    add("refined", estimate.depth_refined, estimate.variance_refined);
+    out.depth = {name, out.methods.front().accuracy};
     out.reliability = reliability(estimate.opacity.data(), truth.data());
   }
 
-  static ViewDepth countable(const DepthLayers& layers, const PinholeCamera& camera) {
-    ViewDepth view{camera, layers.depth};
+  static ViewDepth countable(const DepthLayers& layers, const Image& depth, const PinholeCamera& camera) {
+    ViewDepth view{camera, depth};
     for (std::size_t i = 0; i < view.depth.data().size(); ++i)
       if (!(layers.opacity.data()[i] > kHasDepth)) view.depth.data()[i] = 0;
     return view;
@@ -253,6 +271,8 @@ class Measurement {
       add_points("depth points that " + std::to_string(options_.views_agree) + " views agree on",
                  one_point_a_cell(depth_points(estimates_, agreeing, threads_), cell));
     }
+    if (!refined_.empty())
+      add_points("refined depth points", one_point_a_cell(depth_points(refined_, {}, threads_), cell));
     saved_ =
         saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold), kConfident);
     add_points("voxels", saved_.centres);
@@ -391,7 +411,7 @@ class Measurement {
   int threads_;
   RunMeasures out_;
   std::vector<Eigen::Vector3d> samples_, seen_;  ///< of the true surface; those that two views see
-  std::vector<ViewDepth> estimates_;
+  std::vector<ViewDepth> estimates_, refined_;
   SavedVoxels saved_;
   std::optional<SurfaceDistance> truth_distance_;
   std::optional<RunRenderer> renderer_;

@@ -29,20 +29,6 @@ Eigen::AlignedBox3d box_of(const FinishedRun& run) {
   return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
 }
 
-/// Input options as the run used them.
-InputOptions input_options(const FinishedRun& run) {
-  InputOptions options;
-  const auto text = [&](const char* name, auto& target) {
-    if (const nlohmann::json& value = run.option(name); value.is_string()) target = value.get<std::string>();
-  };
-  text("format", options.format);
-  text("images", options.images);
-  text("nodes", options.nodes);
-  text("masks", options.masks);
-  text("response", options.response);
-  return options;
-}
-
 void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSource& source) {
   const std::string path = paths.dataset.value_or(source.run.file.info.dataset);
   if (path.empty() || (!paths.dataset && !fs::exists(path))) {
@@ -51,7 +37,7 @@ void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSou
     return;
   }
   try {
-    source.input = read_input(path, input_options(source.run), session);
+    source.input = read_input(path, input_options_of(source.run), session);
   } catch (const InvalidInput& error) {
     if (paths.dataset) throw;
     source.notes.push_back(std::string("the run's data set cannot be read as it was: ") + error.what() +
@@ -91,7 +77,7 @@ void read_held_out(const Session& session, EvalSource& source) {
        {source.truth.value_or(""), source.input ? fs::path(source.input->dataset.path) : fs::path()}) {
     const fs::path file = folder / "transforms_test.json";
     if (folder.empty() || !fs::is_regular_file(file)) continue;
-    InputOptions options = input_options(source.run);
+    InputOptions options = input_options_of(source.run);
     options.format = "transforms";
     options.images.reset();
     options.nodes.reset();
@@ -101,6 +87,19 @@ void read_held_out(const Session& session, EvalSource& source) {
 }
 
 }  // namespace
+
+InputOptions input_options_of(const FinishedRun& run) {
+  InputOptions options;
+  const auto text = [&](const char* name, auto& target) {
+    if (const nlohmann::json& value = run.option(name); value.is_string()) target = value.get<std::string>();
+  };
+  text("format", options.format);
+  text("images", options.images);
+  text("nodes", options.nodes);
+  text("masks", options.masks);
+  text("response", options.response);
+  return options;
+}
 
 const View* EvalSource::view(const std::string& name) const {
   const auto found = views.find(name);

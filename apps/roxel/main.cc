@@ -19,6 +19,7 @@ Commands make_commands() {
   add_info(commands);
   add_reconstruct(commands);
   add_sky(commands);
+  add_depth(commands);
   add_render(commands);
   add_eval(commands);
   add_merge(commands);

@@ -258,8 +258,26 @@ CHANGES = {
     "voxel-size": ([], ["--voxel-size", "0.3"]),
     "white-point": ([], ["--white-point", "A"]),
 }
-# Options that change files or what is said, and not the numbers; the tests of Switches are theirs.
-ELSEWHERE = {"depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "sky", "threads", "verbose"}
+# Options of the depth stage: what is given besides, and a value that must change the depth maps.
+DEPTH_CHANGES = {
+    "bp": ([], ["--no-bp"]),
+    "bp-fill": ([], ["--bp-fill"]),
+    "bp-prior": ([], ["--bp-prior", "plain"]),
+    "bp-schedule": ([], ["--bp-schedule", "residual"]),
+    "bp-sigma": ([], ["--bp-sigma", "0.3"]),
+    "bp-sweeps": ([], ["--bp-sweeps", "2"]),
+    "refine": ([], ["--no-refine"]),
+    "refine-agree": ([], ["--no-refine-agree"]),
+    "refine-noise": ([], ["--refine-noise", "0.2"]),
+    "refine-pixel-sigma": ([], ["--refine-pixel-sigma", "1"]),
+    "refine-radius": ([], ["--refine-radius", "2"]),
+    "refine-rounds": ([], ["--refine-rounds", "0"]),
+    "refine-seed": ([], ["--refine-seed", "7"]),
+    "refine-sigmas": ([], ["--refine-sigmas", "0.5"]),
+    "refine-views": ([], ["--refine-views", "1"]),
+}
+# Options that change files or what is said, and not the numbers; the tests of Switches and Depth are theirs.
+ELSEWHERE = set(DEPTH_CHANGES) | {"export", "depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "sky", "threads", "verbose"}
 
 
 def numbers(summary):
@@ -289,7 +307,7 @@ class Options(Case):
                 self.assertNotEqual(known[key], changed)
 
     def result(self, arguments):
-        out, summary = self.reconstruct("run", *arguments)
+        out, summary = self.reconstruct("run", "--no-bp", "--no-refine", *arguments)
         # What decides about the photographs' reading is part of the result, too.
         return numbers(summary), summary["dataset"]["format"], digest(out / "voxels.ply")
 
@@ -306,6 +324,94 @@ class Options(Case):
         made = self.succeed("help-markdown").stdout
         self.assertEqual(page[page.index(made.split("\n", 1)[0]):], made,
                          "docs/commands.md: its end is what `roxel help-markdown` prints")
+
+
+class Depth(Case):
+    REFINED = (b"Z.bp", b"V.bp", b"Z.refined", b"V.refined", b"N.x", b"N.y", b"N.z")
+
+    def maps(self, out):
+        return [digest(out / f"depth/00{i}.exr") for i in range(4)]
+
+    def channels(self, out):
+        head = (out / "depth/000.exr").read_bytes()[:2000]
+        return [name for name in self.REFINED if name + b"\0" in head]
+
+    def test_every_option_changes_the_depth_maps(self):
+        out, _ = self.reconstruct("options", "--no-render", "--no-report")
+        known = self.maps(out)
+        for option, (base, change) in DEPTH_CHANGES.items():
+            with self.subTest(option):
+                self.succeed("depth", out, *base, *change, "--quiet")
+                self.assertNotEqual(known, self.maps(out))
+
+    def test_reconstruct_and_depth_make_the_same_maps_with_any_number_of_threads(self):
+        out, summary = self.reconstruct("same", "--no-render", "--threads", "2")
+        known = self.maps(out)
+        self.assertEqual(self.channels(out), list(self.REFINED))
+        for arguments in [["--threads", "1"], ["--threads", "3"], ["--from-volume"]]:
+            self.succeed("depth", out, *arguments, "--quiet")
+            self.assertEqual(known, self.maps(out), arguments)
+        again = json.loads((out / "summary.json").read_text())
+        self.assertEqual(sorted(s["name"] for s in summary["stages"]), sorted(s["name"] for s in again["stages"]))
+        self.assertEqual(summary["depth"]["refined"]["pixels"], again["depth"]["refined"]["pixels"])
+        self.assertLess(again["depth"]["bp"]["mean_variance_after"], again["depth"]["bp"]["mean_variance_before"])
+        self.assertGreater(again["depth"]["refined"]["matched_pixels"], 100)
+        self.assertFalse(any(name.startswith(".") for name in files_below(out)), files_below(out))
+
+    def test_parts_can_be_left_out_and_leave_nothing_old(self):
+        out, summary = self.reconstruct("parts", "--no-bp", "--no-refine", "--no-render")
+        self.assertEqual(self.channels(out), [])
+        self.assertNotIn("depth", summary)
+        self.succeed("depth", out, "--quiet")
+        self.succeed("depth", out, "--no-refine", "--quiet")
+        self.assertEqual(self.channels(out), [b"Z.bp", b"V.bp"])
+        self.succeed("depth", out, "--no-bp", "--quiet")
+        self.assertEqual(self.channels(out), list(self.REFINED[2:]))
+
+    def test_a_run_without_depth_maps_is_marched_through(self):
+        out, _ = self.reconstruct("bare", "--no-depth", "--no-render")
+        said = json.loads(self.succeed("depth", out, "--json").stdout)
+        self.assertGreater(said["refined"]["pixels"], 100)
+        self.assertEqual(self.channels(out), list(self.REFINED))
+
+    def test_eval_measures_the_methods_side_by_side(self):
+        out, _ = self.reconstruct("measured", "--no-render")
+        metrics = self.folder / "measured-metrics"
+        text = self.succeed("eval", out, "-o", metrics).stdout
+        self.assertRegex(text, r"\| volume .*\n\| bp .*\n\| refined ")
+        methods = json.loads((metrics / "metrics.json").read_text())["depth"]["methods"]
+        self.assertEqual(list(methods), ["volume", "bp", "refined"])
+        for measured in methods.values():
+            self.assertGreater(measured["median_sigma_voxels"], 0)
+            self.assertTrue(0 <= measured["coverage_68"] <= measured["coverage_95"] <= 1)
+        self.assertNotEqual(methods["volume"]["log_loss"], methods["refined"]["log_loss"])
+        self.assertIn("depth error, refined", (metrics / "report.html").read_text())
+
+    def test_depth_goes_to_colmap(self):
+        out, _ = self.reconstruct("exported", "--export", "colmap", "--no-render")
+        there = self.folder / "workspace"
+        self.succeed("convert", out, "--to", "colmap-dense", "-o", there, "--quiet")
+        self.assertEqual(digests(out / "colmap"), digests(there))
+        for kind, planes in (("depth", 1), ("normal", 3)):
+            data = (there / f"stereo/{kind}_maps/000.png.geometric.bin").read_bytes()
+            head = f"64&48&{planes}&".encode()
+            self.assertTrue(data.startswith(head), data[:20])
+            self.assertEqual(len(data), len(head) + 4 * 64 * 48 * planes)
+        self.assertEqual((there / "stereo/fusion.cfg").read_text(), "000.png\n001.png\n002.png\n003.png\n")
+        tracks = (there / "sparse/points3D.txt").read_text().splitlines()[1:]
+        self.assertTrue(tracks and all(len(line.split()) >= 12 for line in tracks))
+
+    def test_bad_runs_are_named(self):
+        self.expect_error(2, "expected the folder of a finished run", "depth", self.data)
+        self.expect_error(2, "a finished run", "convert", self.data, "--to", "colmap-dense", "-o", self.folder / "no")
+        out, _ = self.reconstruct("bad", "--no-render")
+        known = self.maps(out)[1:]
+        summary = (out / "summary.json").read_text()
+        (out / "depth/000.exr").write_bytes(b"not an image")
+        self.expect_error(2, "000.exr", "depth", out, "--quiet")
+        self.assertEqual(self.maps(out)[1:], known)
+        self.assertEqual((out / "summary.json").read_text(), summary)
+        self.expect_error(2, "--refine-views", "depth", out, "--refine-views", "0")
 
 
 class Switches(Case):

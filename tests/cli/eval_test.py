@@ -104,7 +104,7 @@ class Measures(EvalCase):
             self.assertIn(part, text)
         found = json.loads((out / "metrics.json").read_text())
         self.assertEqual([s["name"] for s in found["surfaces"]],
-                         ["depth points", "depth points that 2 views agree on", "voxels"])
+                         ["depth points", "depth points that 2 views agree on", "refined depth points", "voxels"])
         self.assertTrue(0 < found["volume"]["share_within_4_voxels"] <= 1)
         self.assertTrue(0 < found["volume"]["weighted_mean_opacity"] < 1)
         self.assertEqual(len(found["images"]["views"]), 4)
@@ -435,9 +435,9 @@ class Report(EvalCase):
                     found = self.probe(page, width)
                     self.assertEqual(found["width"], width)
                     self.assertLessEqual(found["needed"], width, "it scrolls sideways")
-                    pictures = 6 if name == "eval" else 5  # and the error of depth
+                    pictures = 10  # of two rows
                     self.assertEqual((found["images"], found["broken"]), (4 * pictures, 0))
-                    self.assertEqual(found["columns"], columns or pictures)
+                    self.assertEqual(found["columns"], columns or 5)
                     self.assertEqual(found["sections"], 3)
                     self.assertGreaterEqual(found["plots"], 5)
 

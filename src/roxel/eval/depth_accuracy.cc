@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "roxel/base/error.h"
 
@@ -31,6 +32,30 @@ std::size_t normalized_bin(double error, double sigma, std::size_t bins) {
   return static_cast<std::size_t>(std::clamp(bin, 0.0, last));
 }
 
+std::size_t log_bin(double voxels) {
+  constexpr int kBins = std::tuple_size_v<DepthAccuracy::LogBins>;
+  if (!(voxels > 0)) return 0;
+  const double bin = (std::log10(voxels) - DepthAccuracy::kLowestDecade) * DepthAccuracy::kBinsPerDecade;
+  return static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0));
+}
+
+/// The middle of the bin that the median falls into.
+double median_of(const DepthAccuracy::LogBins& bins) {
+  std::int64_t total = 0, count = 0;
+  for (const std::int64_t n : bins) total += n;
+  if (total == 0) return 0;
+  std::size_t bin = 0;
+  while (bin + 1 < bins.size() && 2 * (count + bins[bin]) < total) count += bins[bin++];
+  return std::pow(
+      10.0, DepthAccuracy::kLowestDecade + (static_cast<double>(bin) + 0.5) / DepthAccuracy::kBinsPerDecade);
+}
+
+double log_loss(double error, double sigma) {
+  const double s = std::max(sigma, DepthAccuracy::kLeastSigmaVoxels);
+  const double off = std::min(error / s, DepthAccuracy::kMostDeviations);
+  return std::log(s * std::sqrt(2 * std::numbers::pi)) + 0.5 * off * off;
+}
+
 /// Errors are compared in doubles; a float depth carries 6e-8, far below any voxel. A sigma of NaN is not
 /// known.
 void count_found(DepthAccuracy& sums, double error_voxels, double sigma_voxels, double voxel_size) {
@@ -43,8 +68,11 @@ void count_found(DepthAccuracy& sums, double error_voxels, double sigma_voxels, 
     ++sums.bias_pixels;
     sums.signed_error_voxels += error_voxels;
   }
+  ++sums.errors[log_bin(distance)];
   if (!(sigma_voxels >= 0)) return;
   ++sums.calibrated_pixels;
+  ++sums.sigmas[log_bin(sigma_voxels)];
+  sums.log_loss += log_loss(distance, sigma_voxels);
   ++sums.normalized_errors[normalized_bin(distance, sigma_voxels, sums.normalized_errors.size())];
 }
 
@@ -101,6 +129,12 @@ double DepthAccuracy::median_normalized_error() const {
   return (static_cast<double>(bin) + 0.5) / kBinsPerSigma;
 }
 
+double DepthAccuracy::median_error_voxels() const { return median_of(errors); }
+double DepthAccuracy::median_sigma_voxels() const { return median_of(sigmas); }
+double DepthAccuracy::mean_log_loss() const {
+  return calibrated_pixels > 0 ? log_loss / static_cast<double>(calibrated_pixels) : 0.0;
+}
+
 void DepthAccuracy::add(const DepthAccuracy& other) {
   ROXEL_CHECK(thresholds == other.thresholds);
   ROXEL_CHECK(distances == other.distances);
@@ -113,6 +147,11 @@ void DepthAccuracy::add(const DepthAccuracy& other) {
   for (std::size_t i = 0; i < within.size(); ++i) within[i] += other.within[i];
   for (std::size_t i = 0; i < distances.size(); ++i) within_distance[i] += other.within_distance[i];
   bias_pixels += other.bias_pixels;
+  log_loss += other.log_loss;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    errors[i] += other.errors[i];
+    sigmas[i] += other.sigmas[i];
+  }
   for (std::size_t i = 0; i < normalized_errors.size(); ++i)
     normalized_errors[i] += other.normalized_errors[i];
 }
@@ -142,6 +181,33 @@ DepthAccuracy depth_accuracy(const EstimatedDepth& estimate, std::span<const flo
     }
   }
   return sums;
+}
+
+std::string depth_methods_table(const std::vector<NamedDepthAccuracy>& methods) {
+  if (methods.empty()) return "";
+  char cell[128];
+  std::string head = "| depth", rule = "|---", rows;
+  for (const double threshold : methods.front().accuracy.thresholds) {
+    std::snprintf(cell, sizeof cell, " | within %g %%", threshold);
+    head += cell;
+    rule += "|---:";
+  }
+  for (const auto& [name, a] : methods) {
+    rows += "| " + name;
+    for (std::size_t i = 0; i < a.thresholds.size(); ++i) {
+      std::snprintf(cell, sizeof cell, " | %.2f", 100 * a.share_within(i));
+      rows += cell;
+    }
+    std::snprintf(cell, sizeof cell, " | %.2f | %+.3f | %.4f | %.1f | %.1f | %.4f | %.3f |\n",
+                  100 * a.share_found(), a.bias_voxels(), a.median_error_voxels(),
+                  100 * a.share_within_sigma(1), 100 * a.share_within_sigma(1.96), a.median_sigma_voxels(),
+                  a.mean_log_loss());
+    rows += cell;
+  }
+  return head +
+         " | with depth % | bias | median error | in 68 % interval | in 95 % interval | median sigma | log "
+         "loss |\n" +
+         rule + "|---:|---:|---:|---:|---:|---:|---:|\n" + rows;
 }
 
 std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views, std::size_t most_views) {

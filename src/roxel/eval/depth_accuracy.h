@@ -49,6 +49,17 @@ struct DepthAccuracy {
   static constexpr int kBinsPerSigma = 25;  ///< so that 1 and 1.96 are edges
   std::array<std::int64_t, 10 * kBinsPerSigma + 1> normalized_errors{};
 
+  /// Sizes of errors and of deviations in voxels, in logarithmic bins; the first and last take the rest.
+  static constexpr int kBinsPerDecade = 40;
+  static constexpr int kLowestDecade = -5, kHighestDecade = 3;
+  using LogBins = std::array<std::int64_t, (kHighestDecade - kLowestDecade) * kBinsPerDecade>;
+  LogBins errors{};  ///< of found pixels
+  LogBins sigmas{};  ///< of calibrated pixels
+  /// Sum over calibrated pixels of log(sigma sqrt(2 pi)) + error^2 / 2 sigma^2, in voxels; sigma at least
+  /// kLeastSigmaVoxels, error / sigma at most kMostDeviations, lest one pixel decide.
+  double log_loss = 0;
+  static constexpr double kLeastSigmaVoxels = 1e-4, kMostDeviations = 10;
+
   /// Share in [0, 1] of true pixels within thresholds[i]; a true pixel without depth counts as wrong.
   double share_within(std::size_t i) const;
   /// The same for distances[i].
@@ -64,6 +75,14 @@ struct DepthAccuracy {
   double share_within_sigma(double k) const;
   /// Median of |error| / sigma, to a bin; honest Gaussian variances give 0.674; above: overconfident.
   double median_normalized_error() const;
+
+  /// Median over found pixels of |error|, in voxels, to 6 %.
+  double median_error_voxels() const;
+  /// Median over calibrated pixels of sigma, in voxels, to 6 %.
+  double median_sigma_voxels() const;
+  /// Mean negative log-likelihood of the errors in voxels under Gaussians of the stated deviations; less is
+  /// better.
+  double mean_log_loss() const;
 
   /// Both must have the same thresholds and distances.
   void add(const DepthAccuracy& other);
@@ -83,5 +102,9 @@ struct NamedDepthAccuracy {
 /// the sums.
 std::string depth_accuracy_table(const std::vector<NamedDepthAccuracy>& views,
                                  std::size_t most_views = std::numeric_limits<std::size_t>::max());
+
+/// The same pixels as several methods see them, a row each: shares within the thresholds, median error,
+/// coverage, median sigma, log loss. Markdown.
+std::string depth_methods_table(const std::vector<NamedDepthAccuracy>& methods);
 
 }  // namespace roxel

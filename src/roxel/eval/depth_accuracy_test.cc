@@ -54,6 +54,37 @@ TEST(DepthAccuracy, SharesOfNothingAreZero) {
   EXPECT_EQ(none.median_normalized_error(), 0);
 }
 
+TEST(DepthAccuracy, MediansAndLogLossByHand) {
+  // Voxel 0.5: errors 0.1, 0.2, 1 voxels; deviations 0.2, 0.2, 0.5.
+  const std::vector<float> truth = {4, 4, 4, 4}, depth = {4.05f, 3.9f, 4.5f, 0};
+  const std::vector<float> variance = {0.01f, 0.01f, 0.0625f, 1};
+  DepthAccuracyOptions options;
+  options.voxel_size = 0.5;
+  const DepthAccuracy found = depth_accuracy({depth, variance, {}}, truth, options);
+  EXPECT_NEAR(found.median_error_voxels(), 0.2, 0.2 * 0.06);
+  EXPECT_NEAR(found.median_sigma_voxels(), 0.2, 0.2 * 0.06);
+  const double by_hand =
+      (2 * std::log(0.2) + std::log(0.5) + 3 * 0.5 * std::log(2 * M_PI) + 0.125 + 0.5 + 2) / 3;
+  EXPECT_NEAR(found.mean_log_loss(), by_hand, 1e-5);
+  DepthAccuracy twice = found;
+  twice.add(found);
+  EXPECT_NEAR(twice.mean_log_loss(), by_hand, 1e-5);
+  EXPECT_EQ(twice.median_error_voxels(), found.median_error_voxels());
+  const std::string table = depth_methods_table({{"volume", found}, {"refined", twice}});
+  EXPECT_NE(table.find("| refined | 50.00 | 75.00 |"), std::string::npos) << table;
+}
+
+TEST(DepthAccuracy, LogLossPunishesTooLargeAndTooSmallDeviations) {
+  const std::vector<float> truth(100, 4.0f);
+  std::vector<float> depth;
+  for (int i = 0; i < 100; ++i) depth.push_back(4 + (i % 2 ? 0.1f : -0.1f));
+  const auto loss = [&](float sigma) {
+    return depth_accuracy({depth, std::vector<float>(100, sigma * sigma), {}}, truth, {}).mean_log_loss();
+  };
+  EXPECT_LT(loss(0.1f), loss(0.05f));
+  EXPECT_LT(loss(0.1f), loss(0.2f));
+}
+
 /// Gaussian errors of deviation `spread`, stated as deviation 0.1.
 DepthAccuracy gaussian_errors(double spread) {
   const int count = 40000;

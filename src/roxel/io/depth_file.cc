@@ -14,11 +14,32 @@ struct Channel {
   Image DepthLayers::*image;
   bool required;
 };
-constexpr std::array<Channel, 5> kChannels{{{"Z", &DepthLayers::depth, true},
+constexpr std::array<Channel, 7> kChannels{{{"Z", &DepthLayers::depth, true},
                                             {"V", &DepthLayers::variance, true},
                                             {"A", &DepthLayers::opacity, true},
                                             {"Z.bp", &DepthLayers::depth_bp, false},
-                                            {"V.bp", &DepthLayers::variance_bp, false}}};
+                                            {"V.bp", &DepthLayers::variance_bp, false},
+                                            {"Z.refined", &DepthLayers::depth_refined, false},
+                                            {"V.refined", &DepthLayers::variance_refined, false}}};
+constexpr std::array<const char*, 3> kNormal{"N.x", "N.y", "N.z"};
+
+Image plane_of(const Image& image, int channel) {
+  Image plane(image.width(), image.height(), 1);
+  for (std::size_t i = 0; i < plane.data().size(); ++i)
+    plane.data()[i] = image.data()[image.channels() * i + channel];
+  return plane;
+}
+
+/// Empty unless all three are there.
+Image read_normal(const std::vector<FloatChannel>& planes, const Image& depth) {
+  Image normal(depth.width(), depth.height(), 3);
+  for (int c = 0; c < 3; ++c) {
+    const Image* plane = find_channel(planes, kNormal[c]);
+    if (!plane) return {};
+    for (std::size_t i = 0; i < plane->data().size(); ++i) normal.data()[3 * i + c] = plane->data()[i];
+  }
+  return normal;
+}
 
 }  // namespace
 
@@ -40,6 +61,12 @@ void write_depth(const std::filesystem::path& path, const DepthLayers& layers) {
     ROXEL_CHECK_EQ(image.channels(), 1);
     planes.push_back({channel.name, image});
   }
+  if (!layers.normal.empty()) {
+    ROXEL_CHECK_EQ(layers.normal.width(), layers.depth.width());
+    ROXEL_CHECK_EQ(layers.normal.height(), layers.depth.height());
+    ROXEL_CHECK_EQ(layers.normal.channels(), 3);
+    for (int c = 0; c < 3; ++c) planes.push_back({kNormal[c], plane_of(layers.normal, c)});
+  }
   write_exr(path.string(), planes);
 }
 
@@ -53,6 +80,7 @@ DepthLayers read_depth(const std::filesystem::path& path) {
       throw_invalid(path.string(), std::string("no channel ") + channel.name,
                     "an EXR file with float channels Z, V, A");
   }
+  layers.normal = read_normal(planes, layers.depth);
   return layers;
 }
 

@@ -4,25 +4,16 @@
 #include <filesystem>
 #include <string>
 
-#include "roxel/image/image.h"
+#include "roxel/depth/depth_layers.h"
 
 namespace roxel {
-
-/// One-channel images of one size. The last two are empty, or of that size too.
-struct DepthLayers {
-  Image depth;             ///< Z: along the optical axis, world units, 0 = none
-  Image variance;          ///< V: of Z, world units squared
-  Image opacity;           ///< A: of the ray, in [0, 1]
-  Image depth_bp = {};     ///< Z.bp: after belief propagation
-  Image variance_bp = {};  ///< V.bp
-};
 
 /// RUN/depth/NAME.exr for the name of a view (without suffix), which may contain folders; "." and ".." in it
 /// are dropped, so that the file is never outside RUN/depth.
 std::filesystem::path depth_path(const std::filesystem::path& run, const std::string& view_name);
 
-/// Writes 32-bit float EXR with channels Z, V, A, and Z.bp, V.bp where present. Makes missing folders.
-/// Atomic; throws IoError.
+/// Writes 32-bit float EXR with channels Z, V, A, and Z.bp, V.bp, Z.refined, V.refined, N.x, N.y, N.z where
+/// present. Makes missing folders. Atomic; throws IoError.
 void write_depth(const std::filesystem::path& path, const DepthLayers& layers);
 
 /// Throws InvalidInput, naming the file, when it is missing, cut off, or without the channels Z, V, A.

@@ -44,6 +44,7 @@ table.text td:first-child { overflow-wrap: normal; }
 figcaption { font-size: .85rem; color: #444; }
 .view { break-inside: avoid; margin: 0 0 1rem; }
 .view .row { display: grid; grid-auto-flow: column; grid-auto-columns: minmax(0, 1fr); gap: .3rem; }
+.view .many { grid-auto-flow: row; grid-template-columns: repeat(5, minmax(0, 1fr)); }
 .view figure { margin: 0; }
 .view img { width: 100%; height: auto; display: block; background: #ddd; }
 .settings { columns: 22rem; font-size: .85rem; font-family: ui-monospace, monospace; }
@@ -51,7 +52,7 @@ figcaption { font-size: .85rem; color: #444; }
 footer { margin-top: 2rem; font-size: .85rem; color: #555; border-top: 1px solid #ccc; padding-top: .4rem; }
 @media (max-width: 40rem) {
   body { padding: .6rem; }
-  .view .row { grid-auto-flow: row; grid-template-columns: repeat(6, minmax(0, 1fr)); }
+  .view .row, .view .many { grid-auto-flow: row; grid-template-columns: repeat(6, minmax(0, 1fr)); }
   .view figure { grid-column: span 3; }
   .view .five figure:nth-child(n+3) { grid-column: span 2; }
   table { font-size: .85rem; }
@@ -288,6 +289,29 @@ class Page {
       rows[1].push_back(percent(value, 2));
     }
     out_ += "<h3>Depth</h3>\n" + table(rows);
+    if (m.depth_methods.size() > 1) depth_methods(m.depth_methods);
+  }
+
+  /// The same pixels before and after belief propagation and refinement.
+  void depth_methods(const std::vector<NamedDepthAccuracy>& methods) {
+    std::vector<std::vector<std::string>> rows{{"depth from"}};
+    for (const double t : methods.front().accuracy.thresholds)
+      rows[0].push_back("within " + short_number(t) + " voxels");
+    for (const char* head : {"bias, voxels", "median error, voxels", "in 68 % interval", "in 95 % interval",
+                             "median sigma, voxels", "log loss"})
+      rows[0].push_back(head);
+    for (const auto& [name, a] : methods) {
+      std::vector<std::string> row{name};
+      for (std::size_t i = 0; i < a.thresholds.size(); ++i) row.push_back(percent(a.share_within(i), 2));
+      row.push_back(formatted("%+.3f", a.bias_voxels()));
+      row.push_back(formatted("%.3f", a.median_error_voxels()));
+      row.push_back(percent(a.share_within_sigma(1), 1));
+      row.push_back(percent(a.share_within_sigma(1.96), 1));
+      row.push_back(formatted("%.3f", a.median_sigma_voxels()));
+      row.push_back(formatted("%.3f", a.mean_log_loss()));
+      rows.push_back(row);
+    }
+    out_ += table(rows);
   }
 
   void quality_table(const char* title, const std::vector<NamedImageQuality>& list) {
@@ -330,7 +354,10 @@ class Page {
     for (const ReportView& view : views) {
       out_ += "<div class=\"view\"><h3>" + escape_markup(view.name) + (view.figures.empty() ? "" : ": ") +
               escape_markup(view.figures) + "</h3><div class=\"row" +
-              (view.pictures.size() == 5 ? " five" : "") + "\">\n";
+              (view.pictures.size() == 5  ? " five"
+               : view.pictures.size() > 6 ? " many"
+                                          : "") +
+              "\">\n";
       for (const ReportPicture& picture : view.pictures)
         out_ += "<figure><img src=\"" + picture.uri + "\" alt=\"" +
                 escape_markup(picture.caption + " of " + view.name) + "\"><figcaption>" +

@@ -38,13 +38,21 @@ ordered_json accuracy_json(const DepthAccuracy& accuracy) {
            {{"1", accuracy.share_within_sigma(1)},
             {"2", accuracy.share_within_sigma(2)},
             {"3", accuracy.share_within_sigma(3)}}},
-          {"median_normalized_error", accuracy.median_normalized_error()}};
+          {"median_normalized_error", accuracy.median_normalized_error()},
+          {"coverage_68", accuracy.share_within_sigma(1)},
+          {"coverage_95", accuracy.share_within_sigma(1.96)},
+          {"median_error_voxels", accuracy.median_error_voxels()},
+          {"median_sigma_voxels", accuracy.median_sigma_voxels()},
+          {"log_loss", accuracy.mean_log_loss()}};
 }
 
 ordered_json depth_json(const RunMeasures& measures) {
   if (measures.depth.empty()) return nullptr;
   ordered_json json = accuracy_json(total_depth(measures.depth));
   json["truth"] = measures.truth.value_or("");
+  json["methods"] = ordered_json::object();
+  for (const NamedDepthAccuracy& method : measures.depth_methods)
+    json["methods"][method.name] = accuracy_json(method.accuracy);
   json["views"] = ordered_json::array();
   for (const NamedDepthAccuracy& view : measures.depth) {
     ordered_json entry{{"name", view.name}};
@@ -357,6 +365,7 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& m
 std::string to_text(const RunMeasures& measures, std::size_t most_views) {
   std::string text;
   if (!measures.depth.empty()) text += depth_accuracy_table(measures.depth, most_views) + "\n";
+  if (!measures.depth_methods.empty()) text += depth_methods_table(measures.depth_methods) + "\n";
   text += surfaces_text(measures) + volume_text(measures) + quality_text("images", measures.images) +
           quality_text("held-out images", measures.held_out) + calibration_text(measures) +
           color_text(measures.color) + to_text(measures.skies);

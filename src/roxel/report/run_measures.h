@@ -40,6 +40,9 @@ struct RunMeasures {
   std::vector<std::pair<std::string, double>> reprojection;
 
   std::vector<NamedDepthAccuracy> depth;
+  /// All views together, from the volume, after belief propagation ("bp") and refinement ("refined"): those
+  /// that the run has.
+  std::vector<NamedDepthAccuracy> depth_methods;
   std::optional<Reliability> opacity_reliability;
   std::int64_t surface_samples = 0;  ///< of the true surface in the box
   double surface_seen = 0;           ///< share of them that two views see

@@ -154,7 +154,9 @@ ordered_json to_json(const RunRecord& record) {
           {"light", list(summary.light, light_json)},
           {"stages", list(summary.stages,
                           [](const StageRecord& s) {
-                            return ordered_json{{"name", s.name}, {"seconds", s.seconds}};
+                            return ordered_json{{"name", s.name},
+                                                {"seconds", s.seconds},
+                                                {"peak_memory_bytes", s.peak_memory_bytes}};
                           })},
           {"seconds", summary.seconds},
           {"threads", record.threads},

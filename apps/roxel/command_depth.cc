@@ -1,0 +1,135 @@
+/// roxel depth: belief propagation and refinement of a finished run's depth maps, again or for the first
+/// time.
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "command.h"
+#include "common.h"
+#include "depth_files.h"
+#include "eval_source.h"
+#include "roxel/base/atomic_file.h"
+#include "roxel/base/error.h"
+#include "roxel/io/depth_file.h"
+#include "roxel/report/run_record.h"
+#include "roxel/solve/run_stages.h"
+
+namespace roxel::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DepthCommandOptions {
+  std::optional<std::string> dataset;
+  bool from_volume = false;
+  DepthStageOptions stage;
+  CommonOptions common;
+};
+
+OptionTable<DepthCommandOptions> depth_table() {
+  OptionTable<DepthCommandOptions> table;
+  table.group("Source");
+  table.add("dataset", &DepthCommandOptions::dataset)
+      .help("Where the run's photographs and cameras are now")
+      .placeholder("DATASET")
+      .unset("where the run has read them");
+  table.add("from-volume", &DepthCommandOptions::from_volume)
+      .help("March through the volume again; else only where the run has no depth maps");
+  table.include(depth_option_table(), &DepthCommandOptions::stage);
+  table.include(common_option_table(), &DepthCommandOptions::common);
+  return table;
+}
+
+/// The options of `reconstruct` as the run used them.
+ReconstructOptions options_of(const FinishedRun& run) {
+  ReconstructOptions options;
+  nlohmann::json used = nlohmann::json::object();
+  for (const OptionField& field : reconstruct_option_table().fields())
+    if (const nlohmann::json& value = run.option(field.name); !value.is_null()) used[field.name] = value;
+  reconstruct_option_table().apply_json(options, used, (run.path / "summary.json").string() + ": options");
+  return options;
+}
+
+Input read_input_of(const FinishedRun& run, const DepthCommandOptions& options, const Session& session) {
+  const std::string path = options.dataset.value_or(run.file.info.dataset);
+  if (path.empty()) throw_invalid(run.path.string(), "a run that names no data set", "--dataset DATASET");
+  return read_input(path, input_options_of(run), session);
+}
+
+bool has_depth_maps(const fs::path& run, const Dataset& dataset) {
+  return std::all_of(dataset.views.begin(), dataset.views.end(),
+                     [&](const View& view) { return fs::is_regular_file(depth_path(run, view.name)); });
+}
+
+/// Z, V, A of every view, from the saved volume.
+void march(FinishedRun& run, const Input& input, const fs::path& results, RunContext& context, double share) {
+  const ReconstructOptions options = options_of(run);
+  Reconstruction made;
+  made.scene = survey(input.dataset, input.load, options, context);
+  made.volume = std::move(run.file.volume);
+  ViewStageOptions stages;
+  stages.render = false;
+  stages.progress_end = share;
+  for_each_view_result(input.dataset, input.load, made, options, stages, context,
+                       [&](const ViewResult& result) {
+                         write_depth(depth_path(results, input.dataset.views[result.view_idx].name),
+                                     {result.depth.depth, result.depth.variance, result.depth.opacity});
+                       });
+}
+
+/// The run's summary with this stage's figures in the place of older ones.
+std::string new_summary(const FinishedRun& run, const DepthStageFigures& figures,
+                        const nlohmann::ordered_json& options) {
+  nlohmann::ordered_json summary(run.summary);
+  const std::vector<StageRecord> records = stage_records(figures);
+  nlohmann::ordered_json stages = nlohmann::ordered_json::array();
+  for (const auto& stage : summary.value("stages", nlohmann::ordered_json::array()))
+    if (std::none_of(records.begin(), records.end(),
+                     [&](const StageRecord& r) { return r.name == stage.value("name", ""); }))
+      stages.push_back(stage);
+  for (const StageRecord& r : records)
+    stages.push_back({{"name", r.name}, {"seconds", r.seconds}, {"peak_memory_bytes", r.peak_memory_bytes}});
+  summary["stages"] = stages;
+  for (const auto& [name, value] : options.items()) summary["options"][name] = value;
+  summary["depth"] = to_json(figures);
+  return json_text(summary);
+}
+
+int run_depth(const Invocation& invocation, const DepthCommandOptions& options) {
+  Session session(options.common);
+  FinishedRun run = read_run(invocation.inputs.front());
+  if (run.file.volume.box_slot_count() == 0)
+    throw_invalid((run.path / "volume.vdb").string(), "no voxels", "a volume with voxels in its box");
+  const double voxel_size = run.file.volume.index(0).frame().voxel_size;
+  const Input input = read_input_of(run, options, session);
+  const OutputFolder folder(run.path);
+  PartialResults results(folder.path());
+  double begin = 0;
+  if (options.from_volume || !has_depth_maps(run.path, input.dataset)) {
+    begin = 0.3;
+    march(run, input, results.path(), session.context(), begin);
+  }
+  const DepthStageFigures figures =
+      refine_depth_files(input.dataset, input.load, {run.file.info.exposure, voxel_size},
+                         {results.path(), run.path}, options.stage, session.context(), begin, 1);
+  session.context().throw_if_cancelled();
+  write_text_atomically(results.path() / "summary.json",
+                        new_summary(run, figures, depth_option_table().to_json(options.stage)) + "\n");
+  results.publish();
+  session.display().clear();
+  print_result(options.common, brief(figures) + "written to " + run.path.string() + "\n",
+               json_text(to_json(figures)));
+  return 0;
+}
+
+}  // namespace
+
+void add_depth(Commands& commands) {
+  CommandForm form{"depth", "Refine the depth maps of a finished run", "RUN"};
+  form.details =
+      "Adds to RUN/depth/NAME.exr the channels Z.bp, V.bp (belief propagation), and Z.refined, V.refined,\n"
+      "N.x, N.y, N.z (photometric refinement); RUN/summary.json says what it did.\n";
+  add_command(commands, form, depth_table(), run_depth);
+}
+
+}  // namespace roxel::cli

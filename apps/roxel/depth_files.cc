@@ -1,0 +1,197 @@
+#include "depth_files.h"
+
+#include <nlohmann/json.hpp>
+
+#include "roxel/base/error.h"
+#include "roxel/base/formatted.h"
+#include "roxel/io/depth_file.h"
+#include "roxel/io/image_file.h"
+#include "roxel/report/pictures.h"
+#include "roxel/report/run_record.h"
+
+namespace roxel::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr Response kAsItIs{ResponseCurve::kLinear};
+constexpr std::array<const char*, 3> kPlaneChannels{"W", "W.u", "W.v"};
+
+/// Planes between the stage's passes: files of a folder that goes in the end.
+class KeptPlanes {
+ public:
+  KeptPlanes(const fs::path& results, const Dataset& dataset)
+      : folder_(results / ".planes"), dataset_(dataset) {}
+  ~KeptPlanes() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  KeptPlanes(const KeptPlanes&) = delete;
+  KeptPlanes& operator=(const KeptPlanes&) = delete;
+
+  void keep(int view_idx, const RefinedView& view) const {
+    const PlaneMap& map = view.planes;
+    std::vector<FloatChannel> channels{
+        {"V", view.variance}, {"V.shared", view.shared}, {"C", view.correlation}};
+    for (int c = 0; c < 3; ++c) {
+      Image plane(map.width, map.height, 1);
+      for (std::size_t i = 0; i < map.planes.size(); ++i)
+        plane.data()[i] = c == 0 ? map.planes[i].w : c == 1 ? map.planes[i].wu : map.planes[i].wv;
+      channels.push_back({kPlaneChannels[c], std::move(plane)});
+    }
+    write_exr(file(view_idx), channels);
+  }
+
+  RefinedView recall(int view_idx) const {
+    const std::vector<FloatChannel> channels = read_exr_channels(file(view_idx));
+    RefinedView view{
+        {}, *find_channel(channels, "V"), *find_channel(channels, "V.shared"), *find_channel(channels, "C")};
+    view.planes = PlaneMap(view.variance.width(), view.variance.height());
+    const Image *w = find_channel(channels, kPlaneChannels[0]),
+                *wu = find_channel(channels, kPlaneChannels[1]),
+                *wv = find_channel(channels, kPlaneChannels[2]);
+    for (std::size_t i = 0; i < view.planes.planes.size(); ++i)
+      view.planes.planes[i] = {w->data()[i], wu->data()[i], wv->data()[i]};
+    return view;
+  }
+
+ private:
+  std::string file(int view_idx) const {
+    return view_path(folder_, "planes", dataset_.views[view_idx].name, ".exr").string();
+  }
+  fs::path folder_;
+  const Dataset& dataset_;
+};
+
+DepthLayers read_layers(const DepthFolders& folders, const View& view) {
+  fs::path file = depth_path(folders.results, view.name);
+  if (!fs::is_regular_file(file)) file = depth_path(folders.earlier, view.name);
+  DepthLayers layers = read_depth(file);
+  const Intrinsics& k = view.camera.intrinsics;
+  if (layers.depth.width() != k.width || layers.depth.height() != k.height)
+    throw_invalid(file.string(), formatted("%d x %d pixels", layers.depth.width(), layers.depth.height()),
+                  formatted("%d x %d as %s has", k.width, k.height, view.source.c_str()));
+  return layers;
+}
+
+/// The best that is known of the depth.
+void write_picture(const fs::path& results, const View& view, const DepthLayers& layers) {
+  const Image& depth = !layers.depth_refined.empty() ? layers.depth_refined
+                       : !layers.depth_bp.empty()    ? layers.depth_bp
+                                                     : layers.depth;
+  write_png(view_path(results, "depth", view.name, ".png").string(),
+            depth_picture(depth, layers.opacity, shown_depths(depth, layers.opacity)), kAsItIs);
+}
+
+/// Unit vectors as colours: -1 to 1 as black to full.
+Image normal_picture(const Image& normal) {
+  Image picture(normal.width(), normal.height(), 3);
+  for (std::size_t i = 0; i < normal.data().size(); i += 3) {
+    const float* n = &normal.data()[i];
+    if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;
+    for (int c = 0; c < 3; ++c) picture.data()[i + c] = 0.5f + 0.5f * n[c];
+  }
+  return picture;
+}
+
+double mean(double sum, std::int64_t count) { return count > 0 ? sum / static_cast<double>(count) : 0; }
+
+}  // namespace
+
+DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoader& load,
+                                     const DepthScene& scene, const DepthFolders& folders,
+                                     const DepthStageOptions& options, RunContext& context,
+                                     double progress_begin, double progress_end) {
+  const KeptPlanes kept(folders.results, dataset);
+  DepthFiles files;
+  files.read = [&](int v) {
+    DepthLayers layers = read_layers(folders, dataset.views[v]);
+    if (!options.bp) layers.depth_bp = layers.variance_bp = {};  // of an earlier time
+    layers.depth_refined = layers.variance_refined = layers.normal = {};
+    return layers;
+  };
+  files.write = [&](int v, const DepthLayers& layers) {
+    write_depth(depth_path(folders.results, dataset.views[v].name), layers);
+    write_picture(folders.results, dataset.views[v], layers);
+  };
+  files.keep = [&](int v, const RefinedView& view) { kept.keep(v, view); };
+  files.recall = [&](int v) { return kept.recall(v); };
+  DepthStageOptions first = options, second = options;
+  first.refine = false;
+  second.bp = false;
+  const double middle = options.bp ? progress_begin + 0.15 * (progress_end - progress_begin) : progress_begin;
+  DepthStageFigures figures;
+  if (options.bp) {
+    figures = run_depth_stage(dataset, load, scene, files, first, context, progress_begin, middle);
+    figures.propagate_peak_bytes = peak_memory_bytes();
+  }
+  if (options.refine) {
+    figures.add(run_depth_stage(dataset, load, scene, files, second, context, middle, progress_end));
+    figures.refine_peak_bytes = peak_memory_bytes();
+  }
+  return figures;
+}
+
+ordered_json to_json(const DepthStageFigures& figures) {
+  ordered_json json;
+  const PropagationFigures& bp = figures.propagation;
+  if (bp.views > 0)
+    json["bp"] = {
+        {"pixels", bp.pixels},
+        {"filled_pixels", bp.filled},
+        {"mean_variance_before", mean(bp.variance_before, bp.pixels)},
+        {"mean_variance_after", mean(bp.variance_after, bp.pixels)},
+        {"mean_prior_sigma", bp.prior_sigma / bp.views},
+        {"sweeps", bp.sweeps},
+        {"propagation_seconds_per_megapixel", figures.pixels > 0 ? 1e6 * bp.seconds / figures.pixels : 0}};
+  if (figures.refine_seconds > 0)
+    json["refined"] = {
+        {"pixels", figures.refined_pixels},
+        {"matched_pixels", figures.matched_pixels},
+        {"agreed_pixels", figures.agreed_pixels},
+        {"seconds_per_megapixel", figures.pixels > 0 ? 1e6 * figures.refine_seconds / figures.pixels : 0}};
+  return json;
+}
+
+void add_refined_pictures(const fs::path& run, double voxel_size, ReportView& view) {
+  const DepthLayers layers = read_depth(depth_path(run, view.name));
+  const auto add = [&](const std::string& method, const Image& depth, const Image& variance) {
+    if (depth.empty()) return;
+    view.pictures.push_back(report_picture(
+        "depth, " + method, depth_picture(depth, layers.opacity, shown_depths(depth, layers.opacity))));
+    view.pictures.push_back(report_picture("sigma of depth, " + method,
+                                           sigma_picture(variance, depth, layers.opacity, voxel_size)));
+  };
+  add("after belief propagation", layers.depth_bp, layers.variance_bp);
+  add("refined", layers.depth_refined, layers.variance_refined);
+  if (!layers.normal.empty())
+    view.pictures.push_back(report_picture("normals", normal_picture(layers.normal)));
+}
+
+std::vector<StageRecord> stage_records(const DepthStageFigures& figures) {
+  std::vector<StageRecord> records;
+  if (figures.propagate_seconds > 0)
+    records.push_back({"belief propagation", figures.propagate_seconds, figures.propagate_peak_bytes});
+  if (figures.refine_seconds > 0)
+    records.push_back({"refine depth", figures.refine_seconds, figures.refine_peak_bytes});
+  return records;
+}
+
+std::string brief(const DepthStageFigures& figures) {
+  std::string text;
+  const PropagationFigures& bp = figures.propagation;
+  if (bp.views > 0)
+    text += formatted("belief propagation: mean variance of depth %.4g before, %.4g after; %.1f s\n",
+                      mean(bp.variance_before, bp.pixels), mean(bp.variance_after, bp.pixels),
+                      figures.propagate_seconds);
+  if (figures.refine_seconds > 0)
+    text += formatted("refinement: of %lld pixels with depth, %.1f %% matched, %.1f %% agreed on; %.1f s\n",
+                      static_cast<long long>(figures.refined_pixels),
+                      100 * mean(static_cast<double>(figures.matched_pixels), figures.refined_pixels),
+                      100 * mean(static_cast<double>(figures.agreed_pixels), figures.refined_pixels),
+                      figures.refine_seconds);
+  return text;
+}
+
+}  // namespace roxel::cli

@@ -1,0 +1,374 @@
+#include "roxel/depth/depth_stage.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <list>
+#include <map>
+#include <mutex>
+#include <numbers>
+
+#include "roxel/base/parallel.h"
+#include "roxel/depth/agree_views.h"
+
+namespace roxel {
+namespace {
+
+constexpr std::size_t kCachedBytes = std::size_t{1} << 30;  ///< of views beside the one that is worked on
+constexpr double kMostVoxels = 0.8;                         ///< of a depth's deviation, as refinement sees it
+constexpr int kSampleStride = 8;  ///< pixels between samples that sources are chosen by
+
+class Clock {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// The views used last, as long as they fit.
+template <class Value>
+class ViewCache {
+ public:
+  using Load = std::function<Value(int view_idx)>;
+  ViewCache(Load load, std::size_t bytes_a_pixel) : load_(std::move(load)), bytes_a_pixel_(bytes_a_pixel) {}
+
+  /// Those views, in that order; missing ones are loaded by all threads.
+  std::vector<std::shared_ptr<const Value>> get(const std::vector<int>& views, const Dataset& dataset,
+                                                const RunContext& context) {
+    std::vector<std::shared_ptr<const Value>> out(views.size());
+    std::vector<int> missing;
+    for (const int v : views)
+      if (!entries_.contains(v)) missing.push_back(v);
+    std::vector<std::shared_ptr<const Value>> loaded(missing.size());
+    parallel_for(static_cast<std::int64_t>(missing.size()), context.thread_count(), [&](std::int64_t i, int) {
+      context.throw_if_cancelled();
+      loaded[i] = std::make_shared<const Value>(load_(missing[i]));
+    });
+    for (std::size_t i = 0; i < missing.size(); ++i) {
+      const Intrinsics& k = dataset.views[missing[i]].camera.intrinsics;
+      const std::size_t bytes = bytes_a_pixel_ * k.width * k.height;
+      entries_[missing[i]] = {loaded[i], bytes, ++clock_};
+      bytes_ += bytes;
+    }
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      entries_[views[i]].used = ++clock_;
+      out[i] = entries_[views[i]].value;
+    }
+    while (bytes_ > kCachedBytes && entries_.size() > views.size()) {
+      const auto oldest =
+          std::min_element(entries_.begin(), entries_.end(),
+                           [](const auto& a, const auto& b) { return a.second.used < b.second.used; });
+      bytes_ -= oldest->second.bytes;
+      entries_.erase(oldest);
+    }
+    return out;
+  }
+
+ private:
+  struct Entry {
+    std::shared_ptr<const Value> value;
+    std::size_t bytes = 0;
+    std::int64_t used = 0;
+  };
+  Load load_;
+  std::size_t bytes_a_pixel_;
+  std::map<int, Entry> entries_;
+  std::size_t bytes_ = 0;
+  std::int64_t clock_ = 0;
+};
+
+double mean_focal(const PinholeCamera& camera) { return 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy); }
+
+/// How much a view at that angle says of depth.
+double angle_score(double radians) {
+  const double degrees = radians * 180 / std::numbers::pi;
+  if (degrees < 10) return std::pow(degrees / 10, 1.5);
+  if (degrees < 30) return 1;
+  return std::exp(-std::pow((degrees - 30) / 20, 2));
+}
+
+/// The whole stage.
+class DepthStage {
+ public:
+  DepthStage(const Dataset& dataset, const PhotographLoader& load, const DepthScene& scene,
+             const DepthFiles& files, const DepthStageOptions& options, RunContext& context,
+             double progress_begin, double progress_end)
+      : dataset_(dataset),
+        load_(load),
+        scene_(scene),
+        files_(files),
+        options_(options),
+        context_(context),
+        progress_begin_(progress_begin),
+        progress_end_(progress_end),
+        count_(static_cast<int>(dataset.views.size())) {
+    steps_ = count_ * ((options.bp ? 1 : 0) + (options.refine ? 6 : 0));
+  }
+
+  DepthStageFigures run() {
+    for (const View& view : dataset_.views)
+      figures_.pixels += static_cast<double>(view.camera.intrinsics.width) * view.camera.intrinsics.height;
+    if (options_.bp) propagate_all();
+    if (options_.refine) refine_all();
+    return figures_;
+  }
+
+ private:
+  void propagate_all() {
+    const Clock clock;
+    std::vector<PropagationFigures> figures(count_);
+    parallel_for(count_, context_.thread_count(), [&](std::int64_t v, int) {
+      context_.throw_if_cancelled();
+      DepthLayers layers = files_.read(static_cast<int>(v));
+      const Image luma = luma_of(static_cast<int>(v));
+      const PropagationGuide guide{luma, mean_focal(dataset_.views[v].camera), scene_.voxel_size};
+      PropagateDepthOptions options;
+      options.prior = options_.bp_prior;
+      options.prior_sigma = options_.bp_sigma;
+      options.fill = options_.bp_fill;
+      options.propagation.schedule = options_.bp_schedule;
+      options.propagation.sweeps = options_.bp_sweeps;
+      figures[v] = propagate_depth(layers, guide, options, [&] { context_.throw_if_cancelled(); });
+      files_.write(static_cast<int>(v), layers);
+      report("belief propagation", 1);
+    });
+    for (const PropagationFigures& f : figures) figures_.propagation.add(f);
+    figures_.propagate_seconds = clock.seconds();
+  }
+
+  void refine_all() {
+    const Clock clock;
+    ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24);
+    std::vector<std::vector<int>> sources(count_);
+    for (int v = 0; v < count_; ++v) {
+      sources[v] = refine_one(v, views);
+      report("refining depth", 5);
+    }
+    ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 24);
+    for (int v = 0; v < count_; ++v) {
+      agree_one(v, sources[v], refined);
+      report("refining depth", 1);
+    }
+    figures_.refine_seconds = clock.seconds();
+  }
+
+  Image luma_of(int v) const {
+    const Photograph photo = load_(dataset_.views[v]);
+    return matching_luma(photo.rgb, scene_.white, photo.valid);
+  }
+
+  MatchView match_view(int v) const {
+    const DepthLayers layers = files_.read(v);
+    const Photograph photo = load_(dataset_.views[v]);
+    MatchView view{dataset_.views[v].camera,
+                   matching_luma(photo.rgb, scene_.white, photo.valid),
+                   matching_color(photo.rgb, scene_.white),
+                   {},
+                   layers.variance};
+    const float most = static_cast<float>(kMostVoxels * kMostVoxels * scene_.voxel_size * scene_.voxel_size);
+    for (float& variance : view.variance.data()) variance = std::min(variance, most);
+    view.depth = layers.depth_bp.empty() ? believed_depth(layers) : layers.depth_bp;
+    return view;
+  }
+
+  std::vector<int> refine_one(int v, ViewCache<MatchView>& views) {
+    const auto own = views.get({v}, dataset_, context_).front();
+    const std::vector<int> sources = choose_sources(dataset_, v, own->depth, options_.refine_views);
+    const auto held = views.get(sources, dataset_, context_);
+    std::vector<const MatchView*> pointers;
+    for (const auto& view : held) pointers.push_back(view.get());
+    const double focal = mean_focal(own->camera);
+    const PlaneMap start = fit_planes(own->depth, own->variance, focal,
+                                      plane_radius(own->depth, focal, scene_.voxel_size), false);
+    RefineOptions options;
+    options.patch.radius = options_.refine_radius;
+    options.patch.noise = options_.refine_noise;
+    options.patch.gap = scene_.voxel_size;
+    options.pixel_sigma = options_.refine_pixel_sigma;
+    options.sources = options_.refine_views;
+    options.iterations = options_.refine_rounds;
+    options.sigmas = options_.refine_sigmas;
+    options.seed = options_.refine_seed;
+    RefinedView refined = refine_view(*own, pointers, start, options, context_);
+    doubt_unmatched(v, refined);
+    for (const float c : refined.correlation.data()) figures_.matched_pixels += c > 0;
+    files_.keep(v, refined);
+    return sources;
+  }
+
+  /// Where photographs say nothing, the volume's own variance stays.
+  void doubt_unmatched(int v, RefinedView& refined) const {
+    const DepthLayers layers = files_.read(v);
+    for (std::size_t i = 0; i < refined.planes.planes.size(); ++i) {
+      const float w = refined.planes.planes[i].w;
+      if (w <= 0 || refined.correlation.data()[i] > 0) continue;
+      const float variance =
+          layers.depth.data()[i] > 0 ? layers.variance.data()[i] : layers.variance_bp.data()[i];
+      refined.variance.data()[i] = refined.shared.data()[i] = variance * w * w * w * w;
+    }
+  }
+
+  void agree_one(int v, const std::vector<int>& sources, ViewCache<RefinedView>& refined) {
+    const auto own = refined.get({v}, dataset_, context_).front();
+    AgreedView agreed{own->planes, own->variance, Image(own->planes.width, own->planes.height, 1)};
+    if (options_.refine_agree) {
+      const auto held = refined.get(sources, dataset_, context_);
+      std::vector<AgreeingView> others;
+      for (std::size_t i = 0; i < sources.size(); ++i)
+        others.push_back(
+            {held[i].get(), PatchWarp(dataset_.views[v].camera, dataset_.views[sources[i]].camera)});
+      agreed = agree_views(*own, others, context_);
+    }
+    write_refined(v, agreed);
+  }
+
+  void write_refined(int v, const AgreedView& agreed) {
+    DepthLayers layers = files_.read(v);
+    const int width = agreed.planes.width, height = agreed.planes.height;
+    layers.depth_refined = Image(width, height, 1);
+    layers.variance_refined = Image(width, height, 1);
+    layers.normal = Image(width, height, 3);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const PixelPlane& plane = agreed.planes.at(x, y);
+        if (plane.empty()) continue;
+        ++figures_.refined_pixels;
+        figures_.agreed_pixels += *agreed.views.pixel(x, y) > 0;
+        const float z = 1 / plane.w;
+        *layers.depth_refined.pixel(x, y) = z;
+        *layers.variance_refined.pixel(x, y) = *agreed.variance.pixel(x, y) * z * z * z * z;
+        const Eigen::Vector3d normal = world_normal(dataset_.views[v].camera, plane, x + 0.5, y + 0.5);
+        for (int c = 0; c < 3; ++c) layers.normal.pixel(x, y)[c] = static_cast<float>(normal[c]);
+      }
+    files_.write(v, layers);
+  }
+
+  void report(const char* stage, int steps) {
+    Progress progress;
+    progress.stage = stage;
+    const double share = static_cast<double>(done_ += steps) / std::max(1, steps_);
+    progress.fraction = progress_begin_ + (progress_end_ - progress_begin_) * share;
+    context_.report(progress);
+  }
+
+  const Dataset& dataset_;
+  const PhotographLoader& load_;
+  const DepthScene& scene_;
+  const DepthFiles& files_;
+  const DepthStageOptions& options_;
+  RunContext& context_;
+  double progress_begin_, progress_end_;
+  int count_;
+  int steps_ = 0;
+  std::atomic<int> done_{0};
+  DepthStageFigures figures_;
+};
+
+OptionTable<DepthStageOptions> make_table() {
+  using Options = DepthStageOptions;
+  OptionTable<Options> table;
+  table.group("Depth");
+  table.add("bp", &Options::bp)
+      .help("Belief propagation over each view's depth")
+      .source("[Jethwa04] section 6.3");
+  table
+      .add("bp-prior", &Options::bp_prior,
+           {{"edge-aware", DepthPrior::kEdgeAware}, {"plain", DepthPrior::kPlain}})
+      .help(
+          "What neighbours expect of each other: one plane, up to edges of colour or depth; or the same "
+          "depth")
+      .source("docs/depth.md; [Jethwa04] eq. (6.8)");
+  table.add("bp-sigma", &Options::bp_sigma)
+      .help("Deviation between neighbours' depths that the prior grants")
+      .unit("world units")
+      .above(0)
+      .unset("from the depth maps");
+  table
+      .add("bp-schedule", &Options::bp_schedule,
+           {{"synchronous", MessageSchedule::kSynchronous}, {"residual", MessageSchedule::kResidual}})
+      .help("Order of messages: all at once, or always those that change most");
+  table.add("bp-sweeps", &Options::bp_sweeps).help("Most messages a pixel sends").range(1, 100000);
+  table.add("bp-fill", &Options::bp_fill).help("Give depth to pixels without, from their neighbours");
+  table.add("refine", &Options::refine).help("Move depths to where the photographs agree best");
+  table.add("refine-views", &Options::refine_views).help("Views that a patch is looked for in").range(1, 32);
+  table.add("refine-rounds", &Options::refine_rounds).help("Rounds of propagation over a view").range(0, 100);
+  table.add("refine-radius", &Options::refine_radius).help("Radius of a patch").unit("pixels").range(1, 7);
+  table.add("refine-sigmas", &Options::refine_sigmas)
+      .help("Deviations of the volume's depth that refinement may move it by")
+      .range(0.1, 100);
+  table.add("refine-noise", &Options::refine_noise)
+      .help("Deviation of the images that patches are granted")
+      .unit("of white, at middle grey")
+      .range(1e-5, 1);
+  table.add("refine-pixel-sigma", &Options::refine_pixel_sigma)
+      .help("Deviation by which calibration puts a point beside where it is in a photograph")
+      .unit("pixels")
+      .range(0, 10);
+  table.add("refine-seed", &Options::refine_seed).help("Draws other random planes").at_least(0);
+  table.add("refine-agree", &Options::refine_agree).help("Join what several views say of the same surface");
+  return table;
+}
+
+}  // namespace
+
+const OptionTable<DepthStageOptions>& depth_option_table() {
+  static const OptionTable<DepthStageOptions> table = make_table();
+  return table;
+}
+
+std::vector<int> choose_sources(const Dataset& dataset, int view_idx, const Image& depth, int most) {
+  const PinholeCamera& own = dataset.views[view_idx].camera;
+  std::vector<std::pair<double, int>> scores;
+  for (int s = 0; s < static_cast<int>(dataset.views.size()); ++s) {
+    if (s == view_idx) continue;
+    const PinholeCamera& other = dataset.views[s].camera;
+    if ((other.pose.centre - own.pose.centre).norm() == 0) continue;
+    double score = 0;
+    for (int y = kSampleStride / 2; y < depth.height(); y += kSampleStride)
+      for (int x = kSampleStride / 2; x < depth.width(); x += kSampleStride) {
+        const float z = *depth.pixel(x, y);
+        if (!(z > 0)) continue;
+        const Ray ray = own.ray(x + 0.5, y + 0.5);
+        const Eigen::Vector3d point = ray.origin + z * ray.direction;
+        const Eigen::Vector3d seen = other.project(point);
+        if (!(seen.z() > 0) || !(seen.x() > 0) || !(seen.y() > 0) || !(seen.x() < other.intrinsics.width) ||
+            !(seen.y() < other.intrinsics.height))
+          continue;
+        const Eigen::Vector3d a = (own.pose.centre - point).normalized(),
+                              b = (other.pose.centre - point).normalized();
+        const double scale = (mean_focal(other) / seen.z()) / (mean_focal(own) / z);
+        score += angle_score(std::acos(std::clamp(a.dot(b), -1.0, 1.0))) *
+                 std::min(1.0, std::min(scale, 2 / scale));
+      }
+    if (score > 0) scores.emplace_back(-score, s);
+  }
+  std::sort(scores.begin(), scores.end());
+  std::vector<int> chosen;
+  for (const auto& [score, s] : scores)
+    if (static_cast<int>(chosen.size()) < most) chosen.push_back(s);
+  return chosen;
+}
+
+void DepthStageFigures::add(const DepthStageFigures& other) {
+  propagation.add(other.propagation);
+  refined_pixels += other.refined_pixels;
+  matched_pixels += other.matched_pixels;
+  agreed_pixels += other.agreed_pixels;
+  pixels = std::max(pixels, other.pixels);
+  propagate_seconds += other.propagate_seconds;
+  refine_seconds += other.refine_seconds;
+}
+
+DepthStageFigures run_depth_stage(const Dataset& dataset, const PhotographLoader& load,
+                                  const DepthScene& scene, const DepthFiles& files,
+                                  const DepthStageOptions& options, RunContext& context,
+                                  double progress_begin, double progress_end) {
+  depth_option_table().validate(options);
+  return DepthStage(dataset, load, scene, files, options, context, progress_begin, progress_end).run();
+}
+
+}  // namespace roxel
