@@ -13,6 +13,7 @@
 #include "roxel/io/depth_file.h"
 #include "roxel/report/run_record.h"
 #include "roxel/solve/run_stages.h"
+#include "sky_stage.h"
 
 namespace roxel::cli {
 namespace {
@@ -61,11 +62,24 @@ bool has_depth_maps(const fs::path& run, const Dataset& dataset) {
                      [&](const View& view) { return fs::is_regular_file(depth_path(run, view.name)); });
 }
 
+/// The run whose skies this one has used, which may be itself; empty where it has used none.
+fs::path skies_of(const FinishedRun& run) {
+  if (fs::is_directory(run.path / "sky")) return run.path;
+  const nlohmann::json& taken = run.option("sky");
+  return taken.is_string() ? fs::path(taken.get<std::string>()) : fs::path();
+}
+
 /// Z, V, A of every view, from the saved volume.
-void march(FinishedRun& run, const Input& input, const fs::path& results, RunContext& context, double share) {
+void march(FinishedRun& run, Input input, const fs::path& results, RunContext& context, double share) {
   const ReconstructOptions options = options_of(run);
   Reconstruction made;
-  made.scene = survey(input.dataset, input.load, options, context);
+  std::optional<Daylight> daylight;
+  if (const fs::path skies = skies_of(run); !skies.empty()) {
+    daylight = read_daylight(skies, input.dataset);
+    if (daylight->masks) input.load = with_sky_masks(input.load, skies);
+  }
+  made.scene = survey(input.dataset, input.load, options, context, daylight ? &*daylight : nullptr);
+  made.scene.light = light_of_run(run, input.dataset);
   made.volume = std::move(run.file.volume);
   ViewStageOptions stages;
   stages.render = false;

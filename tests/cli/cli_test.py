@@ -358,6 +358,13 @@ class Depth(Case):
         self.assertGreater(again["depth"]["refined"]["matched_pixels"], 100)
         self.assertFalse(any(name.startswith(".") for name in files_below(out)), files_below(out))
 
+    def test_the_runs_own_light_holds_when_its_volume_is_marched_through_again(self):
+        out, summary = self.reconstruct("lit", "--no-render", "--illumination", "gain", "--matching", "local")
+        self.assertGreater(len({tuple(view["light"]) for view in summary["views"]}), 1)
+        known = self.maps(out)
+        self.succeed("depth", out, "--from-volume", "--quiet")
+        self.assertEqual(known, self.maps(out))
+
     def test_parts_can_be_left_out_and_leave_nothing_old(self):
         out, summary = self.reconstruct("parts", "--no-bp", "--no-refine", "--no-render")
         self.assertEqual(self.channels(out), [])

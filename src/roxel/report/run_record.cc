@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <fstream>
+#include <map>
 
 #include "roxel/base/content_hash.h"
 #include "roxel/base/error.h"
@@ -212,6 +213,28 @@ FinishedRun read_run(const fs::path& run) {
   return {run, std::move(summary), read_volume(run / "volume.vdb")};
 }
 
+Light light_of_run(const FinishedRun& run, const Dataset& dataset) {
+  return read_from_summary(run.path, [&] {
+    Light light;
+    const json scene = run.summary.value("scene", json::object());
+    const json found = scene.value("light", json::object());
+    const std::string from = found.value("illumination", "none");
+    for (const LightSource source : {LightSource::kGain, LightSource::kSky})
+      if (from == light_name(source)) light.from = source;
+    light.local_matching = found.value("matching", "canonical") == "local";
+    light.blur_deg = found.value("matching_blur_deg", light.blur_deg);
+    if (light.from == LightSource::kNone) return light;
+    std::map<std::string, std::array<float, 3>> of_names;
+    for (const json& view : run.summary.value("views", json::array()))
+      if (view.contains("light")) of_names[view.value("name", "")] = view["light"].get<std::array<float, 3>>();
+    for (const View& view : dataset.views) {
+      const auto named = of_names.find(view.name);
+      light.of_views.push_back(named == of_names.end() ? std::array<float, 3>{1, 1, 1} : named->second);
+    }
+    return light;
+  });
+}
+
 void throw_damaged_summary(const fs::path& run, const std::string& why) {
   throw_invalid((run / "summary.json").string(), "a value of the wrong kind (" + why + ")",
                 "what roxel wrote");
@@ -229,11 +252,14 @@ void remove_results(const fs::path& run) {
   for (const char* name : {"volume.vdb", "voxels.ply", "overview.png", "report.html"})
     fs::remove(run / name, ignored);
   if (!fs::is_symlink(run / "sky")) fs::remove_all(run / "sky", ignored);
-  for (const json& view : summary.value("views", json::array())) {
-    const std::string name = view.value("name", "");
-    if (name.empty()) continue;
-    for (const char* kind : {"depth", "render", "error"})
-      for (const char* suffix : {".png", ".exr"}) fs::remove(view_path(run, kind, name, suffix), ignored);
+  try {
+    for (const json& view : summary.value("views", json::array())) {
+      const std::string name = view.value("name", "");
+      if (name.empty()) continue;
+      for (const char* kind : {"depth", "render", "error"})
+        for (const char* suffix : {".png", ".exr"}) fs::remove(view_path(run, kind, name, suffix), ignored);
+    }
+  } catch (const json::exception&) {  // a damaged list of views: what it named stays
   }
 }
 

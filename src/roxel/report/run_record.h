@@ -77,6 +77,10 @@ auto read_from_summary(const std::filesystem::path& run, const Read& read) {
   }
 }
 
+/// The light that the run divided out of its photographs, for the views of `dataset` by name (1 for others).
+/// Throws InvalidInput for a damaged summary.
+Light light_of_run(const FinishedRun& run, const Dataset& dataset);
+
 /// Removes the files of an earlier run that its summary.json lists, summary.json first, so that results of
 /// two runs never mix. Does nothing where there is no summary.
 void remove_results(const std::filesystem::path& run);
