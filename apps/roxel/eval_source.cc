@@ -2,6 +2,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/io/ply_file.h"
+#include "run_input.h"
 
 namespace roxel::cli {
 namespace {
@@ -15,33 +16,6 @@ std::vector<std::string> names_of_views(const FinishedRun& run) {
   return names;
 }
 
-/// The bounds of the summary, or the box of the lattice where it has none.
-Eigen::AlignedBox3d box_of(const FinishedRun& run) {
-  const nlohmann::json bounds =
-      run.summary.value("scene", nlohmann::json::object()).value("bounds", nlohmann::json());
-  if (bounds.is_null()) return run.file.volume.index(0).frame().box();
-  const auto v = bounds.get<std::vector<double>>();
-  const bool fits = v.size() == 6 && v[0] < v[3] && v[1] < v[4] && v[2] < v[5];
-  if (!fits)
-    throw_invalid((run.path / "summary.json").string() + ": scene.bounds", bounds.dump(),
-                  "six numbers, the first corner below the second");
-  return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
-}
-
-/// Input options as the run used them.
-InputOptions input_options(const FinishedRun& run) {
-  InputOptions options;
-  const auto text = [&](const char* name, auto& target) {
-    if (const nlohmann::json& value = run.option(name); value.is_string()) target = value.get<std::string>();
-  };
-  text("format", options.format);
-  text("images", options.images);
-  text("nodes", options.nodes);
-  text("masks", options.masks);
-  text("response", options.response);
-  return options;
-}
-
 void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSource& source) {
   const std::string path = paths.dataset.value_or(source.run.file.info.dataset);
   if (path.empty() || (!paths.dataset && !fs::exists(path))) {
@@ -50,7 +24,7 @@ void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSou
     return;
   }
   try {
-    source.input = read_input(path, input_options(source.run), session);
+    source.input = read_input(path, input_options_of(source.run), session);
   } catch (const InvalidInput& error) {
     if (paths.dataset) throw;
     source.notes.push_back(std::string("the run's data set cannot be read as it was: ") + error.what() +
@@ -90,7 +64,7 @@ void read_held_out(const Session& session, EvalSource& source) {
        {source.truth.value_or(""), source.input ? fs::path(source.input->dataset.path) : fs::path()}) {
     const fs::path file = folder / "transforms_test.json";
     if (folder.empty() || !fs::is_regular_file(file)) continue;
-    InputOptions options = input_options(source.run);
+    InputOptions options = input_options_of(source.run);
     options.format = "transforms";
     options.images.reset();
     options.nodes.reset();

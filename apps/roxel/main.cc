@@ -18,6 +18,7 @@ Commands make_commands() {
   Commands commands;
   add_info(commands);
   add_reconstruct(commands);
+  add_mesh(commands);
   add_render(commands);
   add_eval(commands);
   add_merge(commands);
