@@ -14,15 +14,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they lie in memory");
 
-/// Coordinates that are large beside the surface lose its shape in floats.
-bool needs_double(const Mesh& mesh) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& x : mesh.points) box.extend(x);
-  if (box.isEmpty()) return false;
-  const double largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
-  return largest * 0x1p-24 > 1e-6 * box.diagonal().norm();
-}
-
 class Rows {
  public:
   template <class T>
@@ -68,8 +59,16 @@ Rows rows_of(const Surface& surface, bool doubles) {
 
 }  // namespace
 
+bool floats_are_too_coarse(const Mesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& x : mesh.points) box.extend(x);
+  if (box.isEmpty()) return false;
+  const double largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+  return largest * 0x1p-24 > 1e-6 * box.diagonal().norm();
+}
+
 void write_surface_ply(const std::filesystem::path& path, const Surface& surface) {
-  const bool doubles = needs_double(surface.mesh);
+  const bool doubles = floats_are_too_coarse(surface.mesh);
   const Rows rows = rows_of(surface, doubles);
   write_file_atomically(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary);

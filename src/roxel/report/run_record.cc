@@ -124,8 +124,11 @@ ordered_json to_json(const RunRecord& record) {
           {"passes", list(summary.passes, pass_json)},
           {"stages", list(summary.stages,
                           [](const StageRecord& s) {
-                            return ordered_json{{"name", s.name}, {"seconds", s.seconds}};
+                            return ordered_json{{"name", s.name},
+                                                {"seconds", s.seconds},
+                                                {"peak_memory_bytes", s.peak_memory_bytes}};
                           })},
+          {"mesh", record.mesh},
           {"seconds", summary.seconds},
           {"threads", record.threads},
           {"peak_memory_bytes", summary.peak_memory_bytes},
@@ -192,7 +195,9 @@ void remove_results(const fs::path& run) {
   }
   std::error_code ignored;
   fs::remove(run / "summary.json", ignored);
-  for (const char* name : {"volume.vdb", "voxels.ply", "overview.png", "report.html"})
+  for (const char* name : {"volume.vdb", "voxels.ply", "overview.png", "report.html", "mesh.ply", "mesh.glb",
+                           "mesh.obj", "mesh.mtl", "mesh.png", "mesh.jpg", "mesh_views.png",
+                           "mesh_turntable.jpg"})
     fs::remove(run / name, ignored);
   for (const json& view : summary.value("views", json::array())) {
     const std::string name = view.value("name", "");

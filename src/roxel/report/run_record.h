@@ -39,6 +39,7 @@ struct RunRecord {
   std::vector<std::string> warnings;
   std::vector<ViewFigures> views;
   std::optional<double> reprojection_rms;  ///< percent, over all views together
+  nlohmann::ordered_json mesh;             ///< what was made of the surface; null: none
 };
 
 nlohmann::ordered_json to_json(const RunRecord& record);

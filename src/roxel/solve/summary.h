@@ -35,6 +35,7 @@ struct LevelRecord {
 struct StageRecord {
   std::string name;
   double seconds = 0;
+  std::int64_t peak_memory_bytes = 0;  ///< of the process up to its end; 0: not known
 };
 
 struct Summary {

@@ -165,6 +165,8 @@ class Fusion {
   DistanceField make() {
     find_places();
     gather_votes();
+    smooth_distance(*voxels_, options_.smooth, context_.thread_count());
+    fill_unseen(*voxels_, options_.hole_size, context_.thread_count());
     return DistanceField(std::move(voxels_));
   }
 
@@ -205,7 +207,8 @@ class Fusion {
     if (places.empty())
       throw InvalidInput("no view has depth in the box: there is no surface to make");
     openvdb::tools::dilateActiveValues(places, static_cast<int>(std::ceil(options_.band)),
-                                       openvdb::tools::NN_FACE_EDGE_VERTEX);
+                                       openvdb::tools::NN_FACE_EDGE_VERTEX,
+                                       openvdb::tools::IGNORE_TILES);  // others would make tiles of full leaves
     check_size(places);
     voxels_->distance = std::make_shared<openvdb::FloatTree>(places, static_cast<float>(voxels_->band), openvdb::TopologyCopy());
     voxels_->weight = std::make_shared<openvdb::FloatTree>(places, 0.0f, openvdb::TopologyCopy());

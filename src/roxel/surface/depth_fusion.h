@@ -3,6 +3,7 @@
 /// behind it (< 0), as the views that look there say, weighted by how sure they are [Curless96]
 /// (docs/surface.md).
 
+#include <Eigen/Geometry>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -10,8 +11,6 @@
 #include "roxel/base/run_context.h"
 #include "roxel/camera/camera.h"
 #include "roxel/image/image.h"
-
-#include <Eigen/Geometry>
 
 namespace roxel {
 
@@ -33,14 +32,16 @@ struct FusionOptions {
   double band = 3;             ///< half the width of the band in which distances count, voxels
   double least_sigma = 0.5;    ///< no depth is taken to be surer than that, voxels
   float free_opacity = 0.1f;   ///< rays without depth and of less opacity than that see nothing in the box
-  double hole_size = 8;        ///< how far apart seen edges may be that are closed, voxels; 0 = none
-  std::int64_t most_bytes = std::int64_t{8} << 30;  ///< NumericalError where the lattice would take more
+  double smooth = 1;           ///< pull of neighbours, see smooth_distance; 0 = none
+  double hole_size = 12;       ///< how far apart seen edges may be that distances are carried on between, voxels
+  std::int64_t most_bytes = std::int64_t{8} << 30;  ///< InvalidInput where the lattice would take more
 };
 
 /// A distance at the corners of a lattice, in a narrow band around the surfaces that views see.
 class DistanceField {
  public:
   struct Voxels;
+  static constexpr float kFilled = -1;  ///< views of corners that nobody saw
 
   explicit DistanceField(std::unique_ptr<Voxels> voxels);
   DistanceField(DistanceField&&) noexcept;
@@ -50,8 +51,8 @@ class DistanceField {
   /// What the field holds at one corner of the lattice.
   struct Sample {
     float distance = 0;  ///< world units, within the band
-    float weight = 0;    ///< sum of inverse variances, world units to the -2; 0: filled in
-    int views = 0;       ///< that see a surface within the band of it
+    float weight = 0;    ///< sum of inverse variances, world units to the -2; 0: nobody saw it
+    int views = 0;       ///< that see a surface within the band of it; -1: filled in
   };
   /// At the corner nearest to x; none where the field holds nothing.
   std::optional<Sample> at(const Eigen::Vector3d& x) const;

@@ -1,5 +1,6 @@
 #include "roxel/surface/surface.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -77,6 +78,32 @@ Surface kept_triangles(const Surface& surface, const std::vector<std::uint8_t>& 
     kept.mesh.triangles.push_back({renamed[a], renamed[b], renamed[c]});
   }
   return kept;
+}
+
+std::vector<std::array<std::int32_t, 3>> face_neighbours(const Mesh& mesh) {
+  struct Side {
+    std::uint32_t low, high;
+    std::int32_t face, edge;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * mesh.triangles.size());
+  for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax(mesh.triangles[f][k], mesh.triangles[f][(k + 1) % 3]);
+      sides.push_back({low, high, static_cast<std::int32_t>(f), k});
+    }
+  std::stable_sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return a.low != b.low ? a.low < b.low : a.high < b.high;
+  });
+  std::vector<std::array<std::int32_t, 3>> neighbours(mesh.triangles.size(), {-1, -1, -1});
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    const Side &a = sides[i], &b = sides[i + 1];
+    if (a.low != b.low || a.high != b.high || a.face == b.face) continue;
+    neighbours[a.face][a.edge] = b.face;
+    neighbours[b.face][b.edge] = a.face;
+    ++i;
+  }
+  return neighbours;
 }
 
 Components connected_components(const Mesh& mesh, const std::vector<std::uint8_t>& among) {

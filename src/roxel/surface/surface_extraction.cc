@@ -2,7 +2,8 @@
 
 #include <openvdb/tools/VolumeToMesh.h>
 
-#include <cmath>
+#include <algorithm>
+#include <limits>
 
 #include "roxel/surface/distance_voxels.inl"
 
@@ -19,16 +20,15 @@ struct LatticeMesh {
 
 double squared(const openvdb::Vec3s& a, const openvdb::Vec3s& b) { return (a - b).lengthSqr(); }
 
-/// Two triangles along the shorter diagonal, turned so that the outside (distance > 0) sees them
-/// counterclockwise.
+/// Two triangles along the shorter diagonal. The outside (distance > 0) sees OpenVDB's corners counterclockwise.
 void add_quad(const openvdb::Vec4I& q, LatticeMesh& mesh) {
   const auto& p = mesh.points;
   if (squared(p[q[0]], p[q[2]]) <= squared(p[q[1]], p[q[3]])) {
-    mesh.triangles.push_back({q[0], q[2], q[1]});
-    mesh.triangles.push_back({q[0], q[3], q[2]});
+    mesh.triangles.push_back({q[0], q[1], q[2]});
+    mesh.triangles.push_back({q[0], q[2], q[3]});
   } else {
-    mesh.triangles.push_back({q[0], q[3], q[1]});
-    mesh.triangles.push_back({q[1], q[3], q[2]});
+    mesh.triangles.push_back({q[0], q[1], q[3]});
+    mesh.triangles.push_back({q[1], q[2], q[3]});
   }
 }
 
@@ -43,50 +43,59 @@ LatticeMesh zero_surface(const openvdb::FloatTree::Ptr& distance) {
     for (std::size_t i = 0; i < pool.numQuads(); ++i) add_quad(pool.quad(i), mesh);
     for (std::size_t i = 0; i < pool.numTriangles(); ++i) {
       const openvdb::Vec3I& t = pool.triangle(i);
-      mesh.triangles.push_back({t[0], t[2], t[1]});
+      mesh.triangles.push_back({t[0], t[1], t[2]});
     }
   }
   return mesh;
 }
 
-/// What is known of the cell that a point lies in.
-struct CellSupport {
-  bool known = true;  ///< views have said something of all its corners
-  float views = 0;    ///< most that see a surface near one of its corners
+/// How well a piece of surface is known.
+enum class Support : std::uint8_t {
+  kNone,    ///< at the end of what is known: no surface at all
+  kWeak,    ///< views saw too little of it, or none did and it was carried on from around
+  kStrong,  ///< enough views saw it
 };
 
-class Support {
+class SupportOfCells {
  public:
-  explicit Support(const DistanceField::Voxels& voxels) : weight_(*voxels.weight), views_(*voxels.views) {}
-  CellSupport operator()(const openvdb::Vec3s& point) {
+  SupportOfCells(const DistanceField::Voxels& voxels, int min_views)
+      : weight_(*voxels.weight), views_(*voxels.views), min_views_(static_cast<float>(min_views)) {}
+
+  /// Of the cell that a point lies in.
+  Support operator()(const openvdb::Vec3s& point) const {
     const Coord base = Coord::floor(openvdb::Vec3d(point));
-    CellSupport support;
+    bool seen = true;
+    float most = 0;
     for (int corner = 0; corner < 8; ++corner) {
       const Coord ijk = base.offsetBy(corner & 1, corner >> 1 & 1, corner >> 2);
-      support.known &= weight_.getValue(ijk) > 0;
-      support.views = std::max(support.views, views_.getValue(ijk));
+      const float views = views_.getValue(ijk);
+      if (weight_.getValue(ijk) > 0) {
+        most = std::max(most, views);
+      } else {
+        seen = false;
+        if (views != DistanceField::kFilled) return Support::kNone;
+      }
     }
-    return support;
+    return seen && most >= min_views_ ? Support::kStrong : Support::kWeak;
   }
 
  private:
   openvdb::tree::ValueAccessor<const openvdb::FloatTree> weight_, views_;
+  float min_views_;
 };
 
-std::vector<std::uint8_t> supported_triangles(const LatticeMesh& mesh, const DistanceField::Voxels& voxels,
-                                              int min_views) {
-  Support support(voxels);
-  std::vector<std::uint8_t> good(mesh.points.size());
-  for (std::size_t i = 0; i < good.size(); ++i) {
-    const CellSupport cell = support(mesh.points[i]);
-    good[i] = cell.known && cell.views >= static_cast<float>(min_views);
-  }
-  std::vector<std::uint8_t> keep(mesh.triangles.size());
-  for (std::size_t t = 0; t < keep.size(); ++t) {
+/// Of every triangle: that of its weakest point.
+std::vector<Support> support_of_triangles(const LatticeMesh& mesh, const DistanceField::Voxels& voxels,
+                                          int min_views) {
+  const SupportOfCells of_cell(voxels, min_views);
+  std::vector<Support> of_point(mesh.points.size());
+  for (std::size_t i = 0; i < of_point.size(); ++i) of_point[i] = of_cell(mesh.points[i]);
+  std::vector<Support> support(mesh.triangles.size());
+  for (std::size_t t = 0; t < support.size(); ++t) {
     const auto& [a, b, c] = mesh.triangles[t];
-    keep[t] = good[a] && good[b] && good[c];
+    support[t] = std::min({of_point[a], of_point[b], of_point[c]});
   }
-  return keep;
+  return support;
 }
 
 /// The longest side of each component's box, lattice steps.
@@ -111,6 +120,41 @@ Mesh topology_of(const LatticeMesh& mesh) {
   return out;
 }
 
+/// Takes out parts of less extent than that; returns how many triangles.
+std::int64_t drop_small_parts(const LatticeMesh& mesh, const Mesh& topology, double smallest,
+                              std::vector<std::uint8_t>& keep) {
+  const Components parts = connected_components(topology, keep);
+  const std::vector<double> sides = extents(mesh, parts);
+  std::int64_t dropped = 0;
+  for (std::size_t t = 0; t < keep.size(); ++t)
+    if (keep[t] && sides[parts.of_triangle[t]] < smallest) {
+      keep[t] = 0;
+      ++dropped;
+    }
+  return dropped;
+}
+
+/// Adds what closes small holes: weak pieces all of whose edges lie on kept surface. Returns how many triangles.
+std::int64_t close_holes(const LatticeMesh& mesh, const Mesh& topology, const std::vector<Support>& support,
+                         double hole_size, std::vector<std::uint8_t>& keep) {
+  std::vector<std::uint8_t> weak(keep.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) weak[t] = !keep[t] && support[t] != Support::kNone;
+  const Components pieces = connected_components(topology, weak);
+  std::vector<double> sides = extents(mesh, pieces);
+  const auto neighbours = face_neighbours(topology);
+  for (std::size_t t = 0; t < keep.size(); ++t)
+    if (weak[t])
+      for (const std::int32_t n : neighbours[t])
+        if (n < 0 || !(keep[n] || weak[n])) sides[pieces.of_triangle[t]] = std::numeric_limits<double>::infinity();
+  std::int64_t closed = 0;
+  for (std::size_t t = 0; t < keep.size(); ++t)
+    if (weak[t] && sides[pieces.of_triangle[t]] <= hole_size) {
+      keep[t] = 1;
+      ++closed;
+    }
+  return closed;
+}
+
 }  // namespace
 
 Extraction extract_surface(const DistanceField& field, const ExtractionOptions& options) {
@@ -123,15 +167,13 @@ Extraction extract_surface(const DistanceField& field, const ExtractionOptions& 
     whole.mesh.points[i] = voxels.origin + voxels.voxel_size * Vector3d(p.x(), p.y(), p.z());
   }
   Extraction out;
-  std::vector<std::uint8_t> keep = supported_triangles(mesh, voxels, options.min_views);
+  const std::vector<Support> support = support_of_triangles(mesh, voxels, options.min_views);
+  std::vector<std::uint8_t> keep(support.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) keep[t] = support[t] == Support::kStrong;
   out.unsupported = std::count(keep.begin(), keep.end(), 0);
-  const Components parts = connected_components(whole.mesh, keep);
-  const std::vector<double> sides = extents(mesh, parts);
-  for (std::size_t t = 0; t < keep.size(); ++t)
-    if (keep[t] && sides[parts.of_triangle[t]] < options.smallest_part) {
-      keep[t] = 0;
-      ++out.debris;
-    }
+  out.debris = drop_small_parts(mesh, whole.mesh, options.smallest_part, keep);
+  out.closed = close_holes(mesh, whole.mesh, support, options.hole_size, keep);
+  out.unsupported -= out.closed;
   out.surface = kept_triangles(whole, keep);
   return out;
 }

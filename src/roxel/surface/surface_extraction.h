@@ -8,7 +8,7 @@ namespace roxel {
 
 struct ExtractionOptions {
   int min_views = 2;          ///< that must see a piece of surface
-  double hole_size = 8;       ///< extent of what is closed though nobody saw it, where it is surrounded by
+  double hole_size = 12;      ///< extent of what is closed though nobody saw it, where it is surrounded by
                               ///< surface that was seen; lattice steps, 0 = nothing
   double smallest_part = 16;  ///< connected parts of less extent are left out; lattice steps
 };
