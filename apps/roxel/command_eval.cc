@@ -74,7 +74,7 @@ OptionTable<MeasureSwitches> measure_table() {
   table.add("estimate", &MeasureSwitches::estimate)
       .help("Measure this mesh or point set, too")
       .placeholder("FILE.ply")
-      .unset("depth points and voxels of the run alone");
+      .unset("depth points, voxels and mesh.ply of the run alone");
   table.add("opacity-threshold", &MeasureSwitches::opacity_threshold)
       .help("Voxels of at least this opacity are measured")
       .range(0, 0.999)

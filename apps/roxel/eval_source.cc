@@ -51,6 +51,8 @@ std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& s
 void read_surfaces(const EvalPaths& paths, EvalSource& source) {
   if (source.truth && fs::is_regular_file(*source.truth / "mesh.ply"))
     source.surface = read_ply(*source.truth / "mesh.ply");
+  if (source.surface && fs::is_regular_file(source.run.path / "mesh.ply"))
+    source.run_mesh = read_ply(source.run.path / "mesh.ply");
   if (!paths.estimate) return;
   if (!source.surface)
     throw_invalid("--estimate " + *paths.estimate, "no true surface to measure it by",

@@ -19,7 +19,7 @@ struct MeshOptions {
   int min_views = 2;
   double hole_size = 12;
   double smallest_part = 16;
-  double smooth = 1;
+  double smooth = 0.3;
   std::optional<std::int64_t> faces;
   double error = 0.1;
   MeshColors colors = MeshColors::kCanonical;

@@ -32,7 +32,7 @@ struct FusionOptions {
   double band = 3;             ///< half the width of the band in which distances count, voxels
   double least_sigma = 0.5;    ///< no depth is taken to be surer than that, voxels
   float free_opacity = 0.1f;   ///< rays without depth and of less opacity than that see nothing in the box
-  double smooth = 1;           ///< pull of neighbours, see smooth_distance; 0 = none
+  double smooth = 0.3;         ///< pull of neighbours, see smooth_distance; 0 = none
   double hole_size = 12;       ///< how far apart seen edges may be that distances are carried on between, voxels
   std::int64_t most_bytes = std::int64_t{8} << 30;  ///< InvalidInput where the lattice would take more
 };

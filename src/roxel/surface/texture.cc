@@ -201,8 +201,8 @@ class Texturing {
 
   void write_uvs() {
     out_.uv_corners.resize(mesh().triangles.size());
-    const auto uv_of = [&](const Vector2d& at) {
-      return Eigen::Vector2d(at.x() / size_.width, at.y() / size_.height).cast<float>();
+    const auto uv_of = [&](const Vector2d& at) -> Eigen::Vector2f {
+      return {static_cast<float>(at.x() / size_.width), static_cast<float>(at.y() / size_.height)};
     };
     std::vector<std::uint32_t> number(points_.point.size());
     std::vector<std::uint32_t> of_chart(points_.point.size(), 0xffffffffu);
