@@ -15,7 +15,7 @@ enum class MeshTexture { kPng, kJpeg, kNone };
 
 struct MeshOptions {
   std::optional<double> voxel_size;
-  double band = 3;
+  double band = 5;
   int min_views = 2;
   double hole_size = 12;
   double smallest_part = 16;

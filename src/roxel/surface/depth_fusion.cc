@@ -21,6 +21,7 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 constexpr std::int64_t kPixelsAtOnce = 16'000'000;  ///< of views that are in memory together
 constexpr float kLeastCosine = 0.2f;   ///< of the angle between ray and normal: steeper depth says no less
 constexpr float kUnknownCosine = 0.7f;
+constexpr double kFarthestOutline = 4;  ///< pixels
 constexpr std::size_t kBytesPerLeaf = 3 * (Leaf::SIZE * sizeof(float) + 128);
 
 /// A view ready to be asked: per pixel distance along the axis, weight, and the cosine that turns a distance
@@ -119,6 +120,7 @@ class Voting {
   explicit Voting(const FusionOptions& options)
       : band_(static_cast<float>(options.band * options.voxel_size)),
         free_opacity_(options.free_opacity),
+        voxel_size_(options.voxel_size),
         free_weight_(static_cast<float>(1 / (options.voxel_size * options.voxel_size))) {}
 
   Vote operator()(const PreparedView& view, const Vector3d& x) const {
@@ -127,16 +129,32 @@ class Voting {
           uvz.y() < view.depth.height()))
       return {};
     const int px = static_cast<int>(uvz.x()), py = static_cast<int>(uvz.y());
-    if (!view.has(px, py)) return without_depth(view, px, py);
+    if (!view.has(px, py)) return without_depth(view, uvz);
     const float z = depth_at(view, uvz.x(), uvz.y());
-    const float distance = (z - static_cast<float>(uvz.z())) * *view.scale.pixel(px, py);
-    if (distance < -band_) return {};  // hidden
-    return {std::min(distance, band_), *view.weight.pixel(px, py) * behind(distance), distance < band_};
+    const float along = z - static_cast<float>(uvz.z()), scale = *view.scale.pixel(px, py);
+    if (along < -band_) return {};  // hidden; not by the normal, or outlines would throw long shadows
+    const float distance = along * scale;
+    if (distance >= band_ && beside_surface(view, uvz)) return {};
+    return {std::min(distance, band_), *view.weight.pixel(px, py) * scale * behind(along), distance < band_};
   }
 
  private:
-  Vote without_depth(const PreparedView& view, int px, int py) const {
-    if (view.opacity.empty() || !(*view.opacity.pixel(px, py) < free_opacity_)) return {};
+  /// Whether the outline of a surface at this depth passes within a step: then a ray that is free says nothing of
+  /// how far away it is, and thin things would be worn off by all that see past them.
+  bool beside_surface(const PreparedView& view, const Vector3d& uvz) const {
+    const double step = std::clamp(voxel_size_ * view.camera.intrinsics.fx / uvz.z(), 1.0, kFarthestOutline);
+    const auto near = [&](double u, double v) {
+      const int x = static_cast<int>(std::floor(u)), y = static_cast<int>(std::floor(v));
+      return view.has(x, y) && std::abs(*view.depth.pixel(x, y) - static_cast<float>(uvz.z())) < band_;
+    };
+    return near(uvz.x() - step, uvz.y()) || near(uvz.x() + step, uvz.y()) || near(uvz.x(), uvz.y() - step) ||
+           near(uvz.x(), uvz.y() + step);
+  }
+
+  Vote without_depth(const PreparedView& view, const Vector3d& uvz) const {
+    const float opacity =
+        view.opacity.empty() ? 1.0f : *view.opacity.pixel(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
+    if (!(opacity < free_opacity_) || beside_surface(view, uvz)) return {};
     return {band_, free_weight_, false};
   }
 
@@ -146,7 +164,9 @@ class Voting {
     return distance > flat ? 1.0f : (distance + band_) / (flat + band_);
   }
 
-  float band_, free_opacity_, free_weight_;
+  float band_, free_opacity_;
+  double voxel_size_;
+  float free_weight_;
 };
 
 class Fusion {

@@ -29,7 +29,7 @@ using FusionViewLoader = std::function<FusionView(int view_idx)>;
 struct FusionOptions {
   double voxel_size = 0;       ///< of the distance's lattice, world units
   Eigen::AlignedBox3d box;     ///< surfaces outside it are left out
-  double band = 3;             ///< half the width of the band in which distances count, voxels
+  double band = 5;             ///< half the width of the band in which distances count, voxels
   double least_sigma = 0.5;    ///< no depth is taken to be surer than that, voxels
   float free_opacity = 0.1f;   ///< rays without depth and of less opacity than that see nothing in the box
   double smooth = 0.3;         ///< pull of neighbours, see smooth_distance; 0 = none

@@ -97,8 +97,12 @@ void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads
     parallel_for_blocks(std::ssize(now), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
       for (std::int64_t i = begin; i < end; ++i) {
         float sum = certainty[i] * measured[i], weight = certainty[i];
-        for (const std::int32_t n : all.neighbours[i])
-          if (n >= 0) sum += static_cast<float>(strength) * now[n], weight += static_cast<float>(strength);
+        for (int axis = 0; axis < 3; ++axis) {
+          const std::int32_t next_to = all.neighbours[i][2 * axis], last = all.neighbours[i][2 * axis + 1];
+          if (next_to < 0 || last < 0) continue;  // one alone would bend what is straight
+          sum += static_cast<float>(strength) * (now[next_to] + now[last]);
+          weight += 2 * static_cast<float>(strength);
+        }
         next[i] = sum / weight;
       }
     });

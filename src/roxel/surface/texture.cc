@@ -113,7 +113,11 @@ class Texturing {
     choice.seam_cost = options_.seam_cost;
     choice.transient = options_.transient;
     choice.threads = context_.thread_count();
-    out_.transients = drop_transients(out_.gains, choice, views);
+    std::vector<Rgb> canonical;
+    if (options_.match_light)
+      for (const auto& [a, b, c] : mesh().triangles) canonical.push_back(mean_color(a, b, c));
+    out_.transients = drop_transients(out_.gains, canonical, choice, views);
+    weigh_sharpness(views, context_.thread_count());
     neighbours_ = face_neighbours(mesh());
     labels_ = choose_views(neighbours_, views, choice);
     out_.unseen = std::count(labels_.begin(), labels_.end(), kNoView);
@@ -121,6 +125,13 @@ class Texturing {
     out_.charts = std::count_if(charts_.begin(), charts_.end(), [](const Chart& c) { return c.view != kNoView; });
     points_ = chart_points(mesh(), labels_);
     seams_ = seams(mesh(), neighbours_, labels_, points_);
+  }
+
+  Rgb mean_color(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+    Rgb mean{};
+    for (const std::uint32_t corner : {a, b, c})
+      for (int k = 0; k < 3; ++k) mean[k] += out_.surface.colors[corner][k] / 3;
+    return mean;
   }
 
   /// Calls visit(v, camera, display values) for every view that has charts, in order.

@@ -32,19 +32,31 @@ struct Ball {
   }
 };
 
-/// Largest difference, in linear light, between the texture and the ball's colours, over triangles' middles.
-double worst_error(const TexturedSurface& textured) {
+/// Differences, in linear light, between the texture and the ball's colours, at triangles' middles.
+std::vector<double> errors(const TexturedSurface& textured) {
   const HitColor color = texture_colors(textured);
-  double worst = 0;
+  std::vector<double> out;
   const Mesh& mesh = textured.surface.mesh;
   for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) {
     const auto& [a, b, c] = mesh.triangles[f];
     const Rgb found = color({0, f, {1.0 / 3, 1.0 / 3, 1.0 / 3}});
     const Rgb wanted =
         fixture::color_at(((mesh.points[a] + mesh.points[b] + mesh.points[c]) / 3).normalized());
+    double worst = 0;
     for (int k = 0; k < 3; ++k) worst = std::max(worst, std::abs<double>(found[k] - wanted[k]));
+    out.push_back(worst);
   }
-  return worst;
+  return out;
+}
+
+double worst_error(const TexturedSurface& textured) {
+  const std::vector<double> all = errors(textured);
+  return *std::max_element(all.begin(), all.end());
+}
+
+double wrong_triangles(const TexturedSurface& textured) {
+  const std::vector<double> all = errors(textured);
+  return static_cast<double>(std::count_if(all.begin(), all.end(), [](double e) { return e > 0.2; }));
 }
 
 TEST(Texture, ShowsThePhotographsColours) {
@@ -82,8 +94,9 @@ TEST(Texture, WhatPassesThroughOnePhotographIsLeftOut) {
   EXPECT_GT(careful.transients, 0);
   TextureOptions careless;
   careless.transient = 1;
-  EXPECT_LT(worst_error(careful), 0.3);
-  EXPECT_GT(worst_error(ball.textured_with(careless)), 0.4);
+  // Not all: what only this photograph shows cannot be known to be passing.
+  EXPECT_GT(wrong_triangles(ball.textured_with(careless)), 20);
+  EXPECT_LT(wrong_triangles(careful), 0.2 * wrong_triangles(ball.textured_with(careless)));
 }
 
 TEST(Texture, TrianglesThatNobodySeesTakeTheirPointsColours) {
@@ -129,19 +142,18 @@ TEST(TextureViews, AViewSeesItsSideOfTheBall) {
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(colors[i][c], ball.mesh.colors[i][c], 0.03);
 }
 
-/// A strip of four triangles; the first two are better in view 0, the others in view 1.
+/// A strip of four triangles; the last is better in view 1, the others in view 0.
 std::vector<std::vector<FaceView>> strip_views() {
-  return {{{0, 10, {}}, {1, 8, {}}}, {{0, 10, {}}, {1, 8, {}}}, {{0, 8, {}}, {1, 10, {}}}, {{0, 8, {}}, {1, 10, {}}}};
+  return {{{0, 10}, {1, 8}}, {{0, 10}, {1, 8}}, {{0, 10}, {1, 8}}, {{0, 8}, {1, 10}}};
 }
 const std::vector<std::array<std::int32_t, 3>> kStrip{{-1, 1, -1}, {0, 2, -1}, {1, 3, -1}, {2, -1, -1}};
 
 TEST(ViewChoice, SeamsCostWhatTheOptionSays) {
   ViewChoiceOptions options;
-  options.seam_cost = 0.1;  // less than the two times 0.2 that one view for all would cost
-  EXPECT_THAT(choose_views(kStrip, strip_views(), options), testing::ElementsAre(0, 0, 1, 1));
+  options.seam_cost = 0.1;  // less than the 0.2 that view 0 costs the last one
+  EXPECT_THAT(choose_views(kStrip, strip_views(), options), testing::ElementsAre(0, 0, 0, 1));
   options.seam_cost = 1;
-  const std::vector<int> one = choose_views(kStrip, strip_views(), options);
-  EXPECT_THAT(one, testing::Each(one[0]));
+  EXPECT_THAT(choose_views(kStrip, strip_views(), options), testing::Each(0));
   auto views = strip_views();
   views[1].clear();
   EXPECT_EQ(choose_views(kStrip, views, options)[1], kNoView);
@@ -149,10 +161,22 @@ TEST(ViewChoice, SeamsCostWhatTheOptionSays) {
 
 TEST(ViewChoice, TwoViewsThatDifferAreBothKept) {
   std::vector<std::vector<FaceView>> views{{{0, 1, {1, 1, 1}}, {1, 1, {0, 0, 0}}}};
-  EXPECT_EQ(drop_transients({{1, 1, 1}, {1, 1, 1}}, {}, views), 0);
-  views[0].push_back({2, 1, {0.01f, 0, 0}});
-  EXPECT_EQ(drop_transients(std::vector<Rgb>(3, {1, 1, 1}), {}, views), 1);
+  const std::vector<Rgb> gains(3, {1, 1, 1});
+  EXPECT_EQ(drop_transients(gains, {}, {}, views), 0);
+  auto decided = views;
+  EXPECT_EQ(drop_transients(gains, {{1, 1, 0.99f}}, {}, decided), 1);  // the canonical colour decides
+  EXPECT_EQ(decided[0][0].view, 0);
+  views[0].push_back({2, 1, {0.001f, 0, 0}});
+  EXPECT_EQ(drop_transients(gains, {}, {}, views), 1);
   EXPECT_EQ(views[0][0].view, 1);
+}
+
+TEST(ViewChoice, BlurredPhotographsCountLess) {
+  std::vector<std::vector<FaceView>> views{{{0, 1, {}, 0.2f}, {1, 1, {}, 0.01f}, {2, 1, {}, 0.2f}, {3, 1, {}, 5}}};
+  weigh_sharpness(views, 1);
+  EXPECT_NEAR(views[0][0].quality, 1, 1e-6);
+  EXPECT_NEAR(views[0][1].quality, 1.0 / 3, 1e-6);
+  EXPECT_NEAR(views[0][3].quality, 1.25, 1e-6);
 }
 
 TEST(SeamLevelling, BothSidesMeetHalfWay) {

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 constexpr std::int64_t kGrain = 512;
 constexpr std::uint8_t kUsable = 128;
-constexpr float kPlain = 0.02f;  ///< detail that is granted to plain triangles, in display values a pixel
+constexpr double kBorder = 1.5;  ///< pixels next to what is not usable may be mixed with it
 constexpr float kTooDark = 0.01f, kTooBright = 0.95f;  ///< light that says nothing of gains
 constexpr std::size_t kFewTriangles = 20;
 
@@ -63,14 +63,20 @@ class Onlooker {
       if (!look_at(0.9 * corner[k] + 0.1 * middle, uv[k])) return {};
     const Eigen::Vector2d p = uv[1] - uv[0], q = uv[2] - uv[0];
     const auto pixels = static_cast<float>(0.5 * std::abs(p.x() * q.y() - p.y() * q.x()) / (0.9 * 0.9));
-    out.quality = pixels * (detail + kPlain);
+    out.quality = pixels;
+    out.detail = detail;
     return out;
   }
 
  private:
   bool usable(const Vector3d& uvz) const {
-    return view_.usable.empty() ||
-           view_.usable.at(static_cast<int>(uvz.x()), static_cast<int>(uvz.y())) >= kUsable;
+    if (view_.usable.empty()) return true;
+    const auto at = [&](double u, double v) {
+      return view_.usable.at(std::clamp(static_cast<int>(u), 0, view_.usable.width() - 1),
+                             std::clamp(static_cast<int>(v), 0, view_.usable.height() - 1)) >= kUsable;
+    };
+    return at(uvz.x(), uvz.y()) && at(uvz.x() - kBorder, uvz.y()) && at(uvz.x() + kBorder, uvz.y()) &&
+           at(uvz.x(), uvz.y() - kBorder) && at(uvz.x(), uvz.y() + kBorder);
   }
 
   /// How much display values change from pixel to pixel.

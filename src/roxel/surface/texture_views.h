@@ -26,8 +26,9 @@ using TextureViewLoader = std::function<TextureView(int view_idx)>;
 /// One view of one triangle.
 struct FaceView {
   int view = 0;
-  float quality = 0;  ///< pixels that it covers there, those with sharp detail counting more
+  float quality = 0;  ///< pixels that it covers there
   Rgb color{};        ///< mean, linear
+  float detail = 0;   ///< mean change of display values from pixel to pixel
 };
 
 struct SightOptions {

@@ -10,6 +10,9 @@ namespace roxel {
 namespace {
 
 constexpr std::size_t kMostViews = 12;  ///< candidates a triangle, the best ones
+constexpr float kPlain = 0.02f;         ///< detail that is granted to plain triangles
+constexpr float kLeastSharpness = 1.0f / 3, kMostSharpness = 1.25f;
+constexpr float kTie = 1e-4f;           ///< cost of a view by its number: equals are decided the same way everywhere
 constexpr int kRounds = 24;
 constexpr int kSweeps = 10;
 constexpr float kDamping = 0.5f;
@@ -31,12 +34,14 @@ float distance(const Rgb& a, const Rgb& b) {
   return std::max({std::abs(a[0] - b[0]), std::abs(a[1] - b[1]), std::abs(a[2] - b[2])});
 }
 
-std::int64_t drop_from(const std::vector<Rgb>& gains, double transient, std::vector<FaceView>& views) {
-  if (views.size() < 3) return 0;
+std::int64_t drop_from(const std::vector<Rgb>& gains, const Rgb* canonical, double transient,
+                       std::vector<FaceView>& views) {
   std::vector<Rgb> colors;
   for (const FaceView& view : views) colors.push_back(display(view.color, gains[view.view]));
+  if (canonical) colors.push_back(display(*canonical, {1, 1, 1}));
+  if (colors.size() < 3) return 0;
   Rgb middle;
-  std::vector<float> values(views.size());
+  std::vector<float> values(colors.size());
   for (int c = 0; c < 3; ++c) {
     std::transform(colors.begin(), colors.end(), values.begin(), [&](const Rgb& color) { return color[c]; });
     middle[c] = median(values);
@@ -66,7 +71,7 @@ struct Choices {
     for (const FaceView& view : from) best = std::max(best, view.quality);
     for (const FaceView& view : from) {
       views.push_back(view.view);
-      costs.push_back(best > 0 ? 1 - view.quality / best : 0.0f);
+      costs.push_back((best > 0 ? 1 - view.quality / best : 0.0f) + kTie * static_cast<float>(view.view));
     }
   }
   std::size_t size() const { return views.size(); }
@@ -173,13 +178,28 @@ class Labelling {
 
 }  // namespace
 
-std::int64_t drop_transients(const std::vector<Rgb>& gains, const ViewChoiceOptions& options,
-                             std::vector<std::vector<FaceView>>& views) {
+void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads) {
+  parallel_for_blocks(std::ssize(views), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    std::vector<float> details;
+    for (std::int64_t f = begin; f < end; ++f) {
+      if (views[f].size() < 2) continue;
+      details.clear();
+      for (const FaceView& view : views[f]) details.push_back(view.detail);
+      const float usual = median(details) + kPlain;
+      for (FaceView& view : views[f])
+        view.quality *= std::clamp((view.detail + kPlain) / usual, kLeastSharpness, kMostSharpness);
+    }
+  });
+}
+
+std::int64_t drop_transients(const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
+                             const ViewChoiceOptions& options, std::vector<std::vector<FaceView>>& views) {
   std::vector<std::int64_t> dropped(views.size());
   parallel_for_blocks(std::ssize(views), kGrain, options.threads,
                       [&](std::int64_t begin, std::int64_t end, int) {
                         for (std::int64_t f = begin; f < end; ++f)
-                          dropped[f] = drop_from(gains, options.transient, views[f]);
+                          dropped[f] = drop_from(gains, canonical.empty() ? nullptr : &canonical[f],
+                                                 options.transient, views[f]);
                       });
   std::int64_t sum = 0;
   for (const std::int64_t count : dropped) sum += count;

@@ -15,9 +15,16 @@ struct ViewChoiceOptions {
 
 inline constexpr int kNoView = -1;
 
+/// Multiplies each view's quality by its detail, compared with the median of the triangle's views: a blurred
+/// photograph counts down to a third. One that has more than others gains little, since what it has may be the
+/// outline of something in front.
+void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads);
+
 /// Takes out the views that disagree with the others on a triangle's colour: what stood there for a moment.
-/// Returns how many. Colours are compared after the gains of their views.
-std::int64_t drop_transients(const std::vector<Rgb>& gains, const ViewChoiceOptions& options,
+/// Returns how many. Colours are compared after the gains of their views; `canonical` (one a triangle, or empty)
+/// has a voice of its own among them.
+std::int64_t drop_transients(const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
+                             const ViewChoiceOptions& options,
                              std::vector<std::vector<FaceView>>& views);
 
 /// The view of every triangle, kNoView where none sees it. By loopy belief propagation (min-sum, damped, all
