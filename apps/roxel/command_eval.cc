@@ -183,8 +183,12 @@ std::vector<ReportView> report_views_of(const EvalSource& source) {
 }
 
 std::string report_page(const EvalSource& source, const RunMeasures& measures) {
-  ReportContent content{
-      nlohmann::ordered_json(source.run.summary), report_views_of(source), {}, measures.sections, {}, &measures};
+  ReportContent content{nlohmann::ordered_json(source.run.summary),
+                        report_views_of(source),
+                        {},
+                        measures.sections,
+                        {},
+                        &measures};
   content.opacities = saved_voxels(source.run.file.volume, 0, 0).opacity;
   return html_report(content);
 }

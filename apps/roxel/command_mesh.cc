@@ -45,7 +45,8 @@ OptionTable<MeshCommandOptions> mesh_table() {
 Input read_photographs(const FinishedRun& run, const MeshCommandOptions& options, const Session& session) {
   const std::string path = options.source.dataset.value_or(run.file.info.dataset);
   if (path.empty() || !fs::exists(path))
-    throw_invalid(run.path.string(), "a run whose data set \"" + path + "\" is not there", "--dataset DATASET");
+    throw_invalid(run.path.string(), "a run whose data set \"" + path + "\" is not there",
+                  "--dataset DATASET");
   return read_input(path, input_options_of(run), session);
 }
 
@@ -78,17 +79,20 @@ int run_mesh(const Invocation& invocation, const MeshCommandOptions& options) {
   });
   for (const std::string& warning : result.warnings) warn(options.common, warning);
   session.display().clear();
-  print_result(options.common, result.text + "written to " + target.string() + "\n", json_text(result.figures));
+  print_result(options.common, result.text + "written to " + target.string() + "\n",
+               json_text(result.figures));
   return 0;
 }
 
 }  // namespace
 
 void add_mesh(Commands& commands) {
-  CommandForm form{"mesh", "Make a run's surface from its depth maps: vertex colours and texture", "RUN", "DIR"};
+  CommandForm form{"mesh", "Make a run's surface from its depth maps: vertex colours and texture", "RUN",
+                   "DIR"};
   form.output_required = false;
   form.details =
-      "Writes mesh.ply (vertex colours), mesh.glb and mesh.obj (textured), mesh_views.png and mesh_turntable.jpg to\n"
+      "Writes mesh.ply (vertex colours), mesh.glb and mesh.obj (textured), mesh_views.png and "
+      "mesh_turntable.jpg to\n"
       "RUN, and what it did to \"mesh\" in RUN/summary.json; or all to DIR, and mesh.json, with -o.\n";
   add_command(commands, form, mesh_table(), run_mesh);
 }

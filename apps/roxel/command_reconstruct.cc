@@ -223,8 +223,7 @@ class Run {
     views_ = writer.figures();
     report_views_ = writer.report_pictures();
     reprojection_rms_ = writer.reprojection_rms();
-    if (stages.depth || stages.render)
-      add_stage("depth and pictures");
+    if (stages.depth || stages.render) add_stage("depth and pictures");
   }
 
   void add_stage(const char* name) {
@@ -241,8 +240,8 @@ class Run {
 
   /// Where there is no surface to make, a run still has its volume and depth: said, not failed.
   void write_mesh(const std::filesystem::path& results) {
-    const MeshInput source{input_.dataset, input_.load,   made_.volume,  volume_info(), made_.scene.bounds.box,
-                           results,        kViewsWritten, 0.98};
+    const MeshInput source{input_.dataset,         input_.load, made_.volume,  volume_info(),
+                           made_.scene.bounds.box, results,     kViewsWritten, 0.98};
     try {
       MeshResult mesh = make_mesh(source, options_.mesh, results, session_.context());
       mesh_figures_ = std::move(mesh.figures);

@@ -265,8 +265,7 @@ class Measurement {
 
   void add_mesh(const std::string& name, const Mesh& mesh) {
     if (mesh.is_point_set()) return add_points(name, mesh.points);
-    add_surface(name, sample_surface(mesh, {options_.samples, options_.seed, source_.box}),
-                mesh);
+    add_surface(name, sample_surface(mesh, {options_.samples, options_.seed, source_.box}), mesh);
   }
 
   void add_surface(const std::string& name, const std::vector<Eigen::Vector3d>& points, Mesh mesh) {

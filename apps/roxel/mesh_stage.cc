@@ -31,7 +31,9 @@ constexpr int kTurnSize = 240;     ///< pixels
 constexpr int kShownViews = 4;
 constexpr int kShownWidth = 480;
 
-std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
 
 /// What the run's depth file says of a view: the refined depth where there is some.
 FusionView read_fusion_view(const fs::path& file, const View& view) {
@@ -56,7 +58,8 @@ FusionView read_fusion_view(const fs::path& file, const View& view) {
   const Image normals[3] = {channel("N.x"), channel("N.y"), channel("N.z")};
   if (normals[0].empty() || normals[1].empty() || normals[2].empty()) return out;
   out.normal = Image(k.width, k.height, 3);
-  for (std::size_t i = 0; i < out.normal.data().size(); ++i) out.normal.data()[i] = normals[i % 3].data()[i / 3];
+  for (std::size_t i = 0; i < out.normal.data().size(); ++i)
+    out.normal.data()[i] = normals[i % 3].data()[i / 3];
   return out;
 }
 
@@ -71,6 +74,7 @@ class MeshStage {
         voxel_size_(options.voxel_size.value_or(input.volume.index(0).frame().voxel_size / 2)) {}
 
   MeshResult make() {
+    check_voxel_size();
     find_depth();
     fuse_and_extract();
     simplify();
@@ -81,8 +85,11 @@ class MeshStage {
     } else {
       texture();
     }
-    take_pictures();
-    lap("mesh: pictures", 1);
+    say();
+    if (options_.pictures) {
+      take_pictures();
+      lap("mesh: pictures", 1);
+    }
     out_.figures["stages"] = std::move(stages_);
     return std::move(out_);
   }
@@ -101,6 +108,14 @@ class MeshStage {
     progress.fraction = input_.progress_begin + fraction * (input_.progress_end - input_.progress_begin);
     context_.report(progress);
     context_.throw_if_cancelled();
+  }
+
+  /// A lattice much finer than the volume costs memory and shows nothing more: taken for a mistake.
+  void check_voxel_size() const {
+    const double least = input_.volume.index(0).frame().voxel_size / 16;
+    if (voxel_size_ < least)
+      throw_invalid("--mesh-voxel-size", formatted("%g", voxel_size_),
+                    formatted("at least %g, a sixteenth of the volume's voxels", least));
   }
 
   void find_depth() {
@@ -131,7 +146,8 @@ class MeshStage {
     Extraction extraction =
         extract_surface(field, {options_.min_views, options_.hole_size, options_.smallest_part});
     if (extraction.surface.mesh.triangles.empty())
-      throw_invalid(input_.depth_run.string(), "no surface that " + std::to_string(options_.min_views) +
+      throw_invalid(input_.depth_run.string(),
+                    "no surface that " + std::to_string(options_.min_views) +
                         " views agree on and that is large enough",
                     "--min-views 1, a smaller --smallest-part, or better depth maps");
     out_.figures["extracted_triangles"] = extraction.surface.mesh.triangles.size();
@@ -171,14 +187,16 @@ class MeshStage {
   int view_count() const { return static_cast<int>(input_.dataset.views.size()); }
 
   void color() {
-    surface_.colors = volume_colors(surface_.mesh.points, input_.volume, input_.info.colors, context_.thread_count());
+    surface_.colors =
+        volume_colors(surface_.mesh.points, input_.volume, input_.info.colors, context_.thread_count());
     if (options_.colors == MeshColors::kCanonical) return;
     const MeshRays rays(surface_.mesh);
     SightOptions sight;
     sight.tolerance = voxel_size_;
     const std::vector<Rgb> as_they_are(input_.dataset.views.size(), Rgb{1, 1, 1});
-    surface_.colors = photograph_colors(surface_, rays, view_count(), [&](int v) { return texture_view(v); },
-                                        as_they_are, surface_.colors, sight, context_);
+    surface_.colors = photograph_colors(
+        surface_, rays, view_count(), [&](int v) { return texture_view(v); }, as_they_are, surface_.colors,
+        sight, context_);
   }
 
   void texture() {
@@ -189,7 +207,8 @@ class MeshStage {
     wanted.sight_tolerance = voxel_size_;
     wanted.seam_cost = options_.seam_cost;
     wanted.transient = options_.transient;
-    textured_ = textured(std::move(surface_), view_count(), [&](int v) { return texture_view(v); }, wanted, context_);
+    textured_ = textured(
+        std::move(surface_), view_count(), [&](int v) { return texture_view(v); }, wanted, context_);
     out_.figures["texture"] = {{"width", textured_->picture.width()},
                                {"height", textured_->picture.height()},
                                {"charts", textured_->charts},
@@ -199,7 +218,8 @@ class MeshStage {
                                {"seam_rms_before", textured_->seam_before},
                                {"seam_rms", textured_->seam_after}};
     lap("mesh: texture", 0.8);
-    const TextureFormat format = options_.texture == MeshTexture::kJpeg ? TextureFormat::kJpeg : TextureFormat::kPng;
+    const TextureFormat format =
+        options_.texture == MeshTexture::kJpeg ? TextureFormat::kJpeg : TextureFormat::kPng;
     write_surface_ply(results_ / "mesh.ply", textured_->surface);
     write_glb(results_ / "mesh.glb", *textured_, format);
     write_obj(results_ / "mesh.obj", *textured_, format);
@@ -218,7 +238,8 @@ class MeshStage {
     std::vector<std::vector<Image>> rows;
     for (int i = 0; i < std::min(kShownViews, view_count()); ++i) {
       context_.throw_if_cancelled();
-      const View& view = input_.dataset.views[(2 * i + 1) * view_count() / (2 * std::min(kShownViews, view_count()))];
+      const View& view =
+          input_.dataset.views[(2 * i + 1) * view_count() / (2 * std::min(kShownViews, view_count()))];
       rows.push_back({thumbnail(shaded_picture(surface, rays, view.camera, look), kShownWidth),
                       thumbnail(colored_picture(rays, view.camera, color, look), kShownWidth)});
       out_.pictures.views.push_back({view.name,
@@ -231,7 +252,10 @@ class MeshStage {
     write_text_atomically(results_ / "mesh_turntable.jpg", jpeg_bytes(strip, 85));
     out_.pictures.turntable = jpeg_bytes(strip, 80);
     out_.pictures.turns = kTurns;
-    out_.text = formatted("%s triangles", std::to_string(surface.mesh.triangles.size()).c_str());
+  }
+
+  void say() {
+    out_.text = std::to_string(final_surface().mesh.triangles.size()) + " triangles";
     if (textured_)
       out_.text += formatted(", texture of %d x %d from %ld charts", textured_->picture.width(),
                              textured_->picture.height(), static_cast<long>(textured_->charts));
@@ -253,14 +277,14 @@ class MeshStage {
     start -= start.dot(axis) * axis;
     start = start.norm() > 1e-6 ? start.normalized() : axis.unitOrthogonal();
     MeshPictureOptions look;
+    look.samples = 1;
     look.threads = context_.thread_count();
-    std::vector<std::vector<Image>> rows(2);
     Image strip(kTurns * kTurnSize, 2 * kTurnSize, 3);
     for (int turn = 0; turn < kTurns; ++turn) {
       context_.throw_if_cancelled();
       const Eigen::AngleAxisd rotation(2 * 3.14159265358979323846 * turn / kTurns, axis);
-      const PinholeCamera camera =
-          orbit_camera(box.center(), box.diagonal().norm() / 2, rotation * start + 0.35 * axis, axis, kTurnSize);
+      const PinholeCamera camera = orbit_camera(box.center(), box.diagonal().norm() / 2,
+                                                rotation * start + 0.35 * axis, axis, kTurnSize);
       put(shaded_picture(surface, rays, camera, look), turn * kTurnSize, 0, strip);
       put(colored_picture(rays, camera, color, look), turn * kTurnSize, kTurnSize, strip);
     }
@@ -297,15 +321,21 @@ OptionTable<MeshOptions> make_mesh_table() {
       .help("Half the width of the band around a depth in which it counts, in steps of the lattice")
       .range(1.5, 16)
       .source("measured on plane and head");
-  table.add("min-views", &MeshOptions::min_views).help("Views that must see a piece of surface").range(1, 1000);
+  table.add("min-views", &MeshOptions::min_views)
+      .help("Views that must see a piece of surface")
+      .range(1, 1000);
   table.add("hole-size", &MeshOptions::hole_size)
-      .help("Holes that are surrounded by surface and no larger than this are closed, in steps of the lattice; 0: none")
+      .help(
+          "Holes that are surrounded by surface and no larger than this are closed, in steps of the lattice; "
+          "0: none")
       .range(0, 64);
   table.add("smallest-part", &MeshOptions::smallest_part)
       .help("Connected parts of less extent are left out, in steps of the lattice")
       .range(0, 1e9);
   table.add("mesh-smooth", &MeshOptions::smooth)
-      .help("How strongly distances of neighbours pull at those that few or unsure views have made; 0: not at all")
+      .help(
+          "How strongly distances of neighbours pull at those that few or unsure views have made; 0: not at "
+          "all")
       .range(0, 100)
       .source("measured on plane and head");
   table.add("faces", &MeshOptions::faces)
@@ -315,10 +345,14 @@ OptionTable<MeshOptions> make_mesh_table() {
   table.add("mesh-error", &MeshOptions::error)
       .help("How far simplification may move the surface, in steps of the lattice; not used with --faces")
       .range(0, 100);
-  table.add("colors", &MeshOptions::colors, {{"canonical", MeshColors::kCanonical}, {"image", MeshColors::kImage}})
-      .help("Colours of points and texture: in the volume's canonical light, or as the photographs have them");
-  table.add("texture", &MeshOptions::texture,
-            {{"png", MeshTexture::kPng}, {"jpeg", MeshTexture::kJpeg}, {"none", MeshTexture::kNone}})
+  table
+      .add("colors", &MeshOptions::colors,
+           {{"canonical", MeshColors::kCanonical}, {"image", MeshColors::kImage}})
+      .help(
+          "Colours of points and texture: in the volume's canonical light, or as the photographs have them");
+  table
+      .add("texture", &MeshOptions::texture,
+           {{"png", MeshTexture::kPng}, {"jpeg", MeshTexture::kJpeg}, {"none", MeshTexture::kNone}})
       .help("Picture on the surface, in mesh.glb and mesh.obj; none: mesh.ply alone");
   table.add("texture-size", &MeshOptions::texture_size)
       .help("Longest side of the texture; charts are reduced until they fit")
@@ -329,16 +363,21 @@ OptionTable<MeshOptions> make_mesh_table() {
       .range(0, 100);
   table.add("level-seams", &MeshOptions::level_seams).help("Even out colours where photographs meet");
   table.add("transient", &MeshOptions::transient)
-      .help("Photographs that differ by more from the median of what all show of a triangle are not used for it")
+      .help(
+          "Photographs that differ by more from the median of what all show of a triangle are not used for "
+          "it")
       .unit("display values, 0 to 1")
       .range(0, 1);
+  table.add("mesh-pictures", &MeshOptions::pictures)
+      .help("Pictures of the surface: mesh_views.png, mesh_turntable.jpg");
   return table;
 }
 
 }  // namespace
 
 std::vector<std::string> mesh_files() {
-  return {"mesh.ply", "mesh.glb", "mesh.obj", "mesh.mtl", "mesh.png", "mesh.jpg", "mesh_views.png", "mesh_turntable.jpg"};
+  return {"mesh.ply", "mesh.glb", "mesh.obj",       "mesh.mtl",
+          "mesh.png", "mesh.jpg", "mesh_views.png", "mesh_turntable.jpg"};
 }
 
 MeshResult make_mesh(const MeshInput& input, const MeshOptions& options, const fs::path& results,

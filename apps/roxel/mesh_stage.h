@@ -28,6 +28,7 @@ struct MeshOptions {
   double seam_cost = 0.6;
   bool level_seams = true;
   double transient = 0.12;
+  bool pictures = true;
 };
 
 const OptionTable<MeshOptions>& mesh_option_table();
@@ -54,8 +55,8 @@ struct MeshResult {
 /// The files of a mesh in the folder of a run, whether they are there or not.
 std::vector<std::string> mesh_files();
 
-/// Writes them below `results` (see mesh_files). Throws InvalidInput where there is no depth, no surface, or the
-/// target cannot be reached; IoError; Cancelled.
+/// Writes them below `results` (see mesh_files). Throws InvalidInput where there is no depth, no surface, or
+/// the target cannot be reached; IoError; Cancelled.
 MeshResult make_mesh(const MeshInput& input, const MeshOptions& options, const std::filesystem::path& results,
                      RunContext& context);
 

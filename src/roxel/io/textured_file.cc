@@ -137,8 +137,8 @@ tinygltf::Primitive add_geometry(ModelBuilder& builder, const TexturedSurface& t
   const int corners =
       builder.add_view(textured.uv_corners.data(), textured.uv_corners.size() * sizeof textured.uv_corners[0],
                        TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
-  primitive.indices = builder.add_accessor(corners, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, TINYGLTF_TYPE_SCALAR,
-                                           3 * textured.uv_corners.size());
+  primitive.indices = builder.add_accessor(corners, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
+                                           TINYGLTF_TYPE_SCALAR, 3 * textured.uv_corners.size());
   return primitive;
 }
 
@@ -171,7 +171,8 @@ void write_glb(const fs::path& path, const TexturedSurface& textured, TextureFor
   model.defaultScene = 0;
   std::ostringstream bytes;
   tinygltf::TinyGLTF writer;
-  if (!writer.WriteGltfSceneToStream(&model, bytes, false, true)) throw IoError(path.string() + ": cannot be made");
+  if (!writer.WriteGltfSceneToStream(&model, bytes, false, true))
+    throw IoError(path.string() + ": cannot be made");
   write_bytes(path, bytes.str());
 }
 
@@ -181,9 +182,11 @@ void write_obj(const fs::path& path, const TexturedSurface& textured, TextureFor
   picture.replace_extension(format == TextureFormat::kPng ? ".png" : ".jpg");
   materials.replace_extension(".mtl");
   std::string text = "# roxel: surface\nmtllib " + materials.filename().string() + "\nusemtl photographs\n";
-  for (const Eigen::Vector3d& x : surface.mesh.points) text += formatted("v %.9g %.9g %.9g\n", x.x(), x.y(), x.z());
+  for (const Eigen::Vector3d& x : surface.mesh.points)
+    text += formatted("v %.9g %.9g %.9g\n", x.x(), x.y(), x.z());
   for (const Eigen::Vector2f& uv : textured.uvs) text += formatted("vt %.7g %.7g\n", uv.x(), 1 - uv.y());
-  for (const Eigen::Vector3f& n : surface.normals) text += formatted("vn %.5g %.5g %.5g\n", n.x(), n.y(), n.z());
+  for (const Eigen::Vector3f& n : surface.normals)
+    text += formatted("vn %.5g %.5g %.5g\n", n.x(), n.y(), n.z());
   for (std::size_t f = 0; f < surface.mesh.triangles.size(); ++f) {
     text += "f";
     for (int k = 0; k < 3; ++k) {

@@ -38,7 +38,8 @@ TexturedSurface square(const Eigen::Vector3d& corner = Eigen::Vector3d::Zero()) 
   out.surface.normals[3].setZero();
   out.surface.colors = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.5f, 2, -1}};
   out.picture = Image(8, 4, 3);
-  for (std::size_t i = 0; i < out.picture.data().size(); ++i) out.picture.data()[i] = static_cast<float>(i % 5) / 4;
+  for (std::size_t i = 0; i < out.picture.data().size(); ++i)
+    out.picture.data()[i] = static_cast<float>(i % 5) / 4;
   out.uvs = {{0, 0}, {0.5f, 0}, {0, 1}, {0.5f, 0}, {1, 1}, {0.5f, 1}};
   out.uv_corners = {{0, 1, 2}, {3, 4, 5}};
   return out;
@@ -79,8 +80,7 @@ TEST(TexturedFile, GlbHoldsTheSurfaceAndItsPicture) {
   const float* uv = floats(model, primitive.attributes.at("TEXCOORD_0"));
   EXPECT_EQ(uv[2 * 4], 1.0f);
   const float* normals = floats(model, primitive.attributes.at("NORMAL"));
-  for (int i = 0; i < 6; ++i)
-    EXPECT_NEAR(Eigen::Map<const Eigen::Vector3f>(normals + 3 * i).norm(), 1, 1e-6);
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(Eigen::Map<const Eigen::Vector3f>(normals + 3 * i).norm(), 1, 1e-6);
   ASSERT_EQ(model.images.size(), 1u);
   EXPECT_EQ(model.images[0].mimeType, "image/png");
   EXPECT_EQ(model.images[0].width, 8);

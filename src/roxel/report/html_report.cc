@@ -358,8 +358,8 @@ class Page {
       row("texture", text_of(at(texture, "width")) + " x " + text_of(at(texture, "height")));
       row("charts", text_of(at(texture, "charts")));
       row("triangles that no photograph shows whole", text_of(at(texture, "unseen_triangles")));
-      row("difference across seams (RMS)",
-          percent(number(texture, "seam_rms_before"), 2) + ", levelled " + percent(number(texture, "seam_rms"), 2));
+      row("difference across seams (RMS)", percent(number(texture, "seam_rms_before"), 2) + ", levelled " +
+                                               percent(number(texture, "seam_rms"), 2));
     }
     out_ += table(rows, "text");
     turntable();
@@ -370,9 +370,10 @@ class Page {
   void turntable() {
     const ReportMesh& mesh = content_.mesh;
     if (mesh.turntable.empty() || mesh.turns < 1) return;
-    out_ += formatted("<div class=\"turntable\" role=\"img\" aria-label=\"the surface from all around\" "
-                      "style=\"--end: -%dpx; animation: turn 6s steps(%d) infinite; background-image: url(",
-                      240 * mesh.turns, mesh.turns) +
+    out_ += formatted(
+                "<div class=\"turntable\" role=\"img\" aria-label=\"the surface from all around\" "
+                "style=\"--end: -%dpx; animation: turn 6s steps(%d) infinite; background-image: url(",
+                240 * mesh.turns, mesh.turns) +
             data_uri("image/jpeg", mesh.turntable) + ")\"></div>\n";
   }
 

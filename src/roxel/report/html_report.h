@@ -21,7 +21,8 @@ struct ReportView {
   std::vector<ReportPicture> pictures = {};
 };
 
-/// The surface: shaded and textured views, and a strip of square pictures from all around, shaded above coloured.
+/// The surface: shaded and textured views, and a strip of square pictures from all around, shaded above
+/// coloured.
 struct ReportMesh {
   std::vector<ReportView> views = {};
   std::string turntable = {};  ///< bytes of a JPEG; empty: none

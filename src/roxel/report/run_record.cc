@@ -195,9 +195,9 @@ void remove_results(const fs::path& run) {
   }
   std::error_code ignored;
   fs::remove(run / "summary.json", ignored);
-  for (const char* name : {"volume.vdb", "voxels.ply", "overview.png", "report.html", "mesh.ply", "mesh.glb",
-                           "mesh.obj", "mesh.mtl", "mesh.png", "mesh.jpg", "mesh_views.png",
-                           "mesh_turntable.jpg"})
+  for (const char* name :
+       {"volume.vdb", "voxels.ply", "overview.png", "report.html", "mesh.ply", "mesh.glb", "mesh.obj",
+        "mesh.mtl", "mesh.png", "mesh.jpg", "mesh_views.png", "mesh_turntable.jpg"})
     fs::remove(run / name, ignored);
   for (const json& view : summary.value("views", json::array())) {
     const std::string name = view.value("name", "");

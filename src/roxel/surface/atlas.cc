@@ -47,7 +47,8 @@ class Skyline {
     while (last < steps_.size() && end(last) <= right) ++last;
     std::vector<Step> with{{left, top}};
     if (last < steps_.size() && steps_[last].x < right) with.push_back({right, steps_[last].top}), ++last;
-    steps_.erase(steps_.begin() + static_cast<std::ptrdiff_t>(first), steps_.begin() + static_cast<std::ptrdiff_t>(last));
+    steps_.erase(steps_.begin() + static_cast<std::ptrdiff_t>(first),
+                 steps_.begin() + static_cast<std::ptrdiff_t>(last));
     steps_.insert(steps_.begin() + static_cast<std::ptrdiff_t>(first), with.begin(), with.end());
   }
 
@@ -61,7 +62,8 @@ AtlasSize pack(int width, std::vector<AtlasRect>& rects) {
   std::vector<std::size_t> order(rects.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return rects[a].height != rects[b].height ? rects[a].height > rects[b].height : rects[a].width > rects[b].width;
+    return rects[a].height != rects[b].height ? rects[a].height > rects[b].height
+                                              : rects[a].width > rects[b].width;
   });
   Skyline skyline(width);
   AtlasSize size{width, 0};

@@ -19,8 +19,9 @@ using MaskTree = openvdb::MaskTree;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr std::int64_t kPixelsAtOnce = 16'000'000;  ///< of views that are in memory together
-constexpr float kLeastCosine = 0.2f;   ///< of the angle between ray and normal: steeper depth says no less
+constexpr float kLeastCosine = 0.2f;  ///< of the angle between ray and normal: steeper depth says no less
 constexpr float kUnknownCosine = 0.7f;
+constexpr float kSupport = 2.5f;        ///< steps from its surface within which a view supports one
 constexpr double kFarthestOutline = 4;  ///< pixels
 constexpr std::size_t kBytesPerLeaf = 3 * (Leaf::SIZE * sizeof(float) + 128);
 
@@ -69,15 +70,21 @@ float axis_to_normal(const PreparedView& view, const Image& normals, int x, int 
   return std::max(kLeastCosine, static_cast<float>(std::abs(normal.dot(ray.direction))));
 }
 
-bool is_depth(float z, float variance) { return z > 0 && std::isfinite(z) && variance >= 0 && std::isfinite(variance); }
+bool is_depth(float z, float variance) {
+  return z > 0 && std::isfinite(z) && variance >= 0 && std::isfinite(variance);
+}
 
 PreparedView prepare(FusionView view, const FusionOptions& options) {
   const int width = view.depth.width(), height = view.depth.height();
   ROXEL_CHECK_EQ(width, view.camera.intrinsics.width);
   ROXEL_CHECK_EQ(height, view.camera.intrinsics.height);
   ROXEL_CHECK_EQ(view.variance.data().size(), view.depth.data().size());
-  PreparedView out{view.camera, std::move(view.depth), Image(width, height, 1), Image(width, height, 1),
-                   std::move(view.opacity), static_cast<float>(options.band * options.voxel_size)};
+  PreparedView out{view.camera,
+                   std::move(view.depth),
+                   Image(width, height, 1),
+                   Image(width, height, 1),
+                   std::move(view.opacity),
+                   static_cast<float>(options.band * options.voxel_size)};
   const float least = static_cast<float>(options.least_sigma * options.voxel_size);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
@@ -98,7 +105,7 @@ PreparedView prepare(FusionView view, const FusionOptions& options) {
 struct Vote {
   float distance = 0;  ///< in front of its surface, world units, at most the band
   float weight = 0;    ///< 0: it says nothing
-  bool near = false;   ///< its surface is within the band
+  bool near = false;   ///< its surface is close by
 };
 
 /// Depth between the four pixels around (u, v), or of the nearest one where they are not on one surface.
@@ -120,6 +127,7 @@ class Voting {
   explicit Voting(const FusionOptions& options)
       : band_(static_cast<float>(options.band * options.voxel_size)),
         free_opacity_(options.free_opacity),
+        support_(static_cast<float>(kSupport * options.voxel_size)),
         voxel_size_(options.voxel_size),
         free_weight_(static_cast<float>(1 / (options.voxel_size * options.voxel_size))) {}
 
@@ -135,12 +143,13 @@ class Voting {
     if (along < -band_) return {};  // hidden; not by the normal, or outlines would throw long shadows
     const float distance = along * scale;
     if (distance >= band_ && beside_surface(view, uvz)) return {};
-    return {std::min(distance, band_), *view.weight.pixel(px, py) * scale * behind(along), distance < band_};
+    return {std::min(distance, band_), *view.weight.pixel(px, py) * scale * behind(along),
+            std::abs(distance) < support_};
   }
 
  private:
-  /// Whether the outline of a surface at this depth passes within a step: then a ray that is free says nothing of
-  /// how far away it is, and thin things would be worn off by all that see past them.
+  /// Whether the outline of a surface at this depth passes within a step: then a ray that is free says
+  /// nothing of how far away it is, and thin things would be worn off by all that see past them.
   bool beside_surface(const PreparedView& view, const Vector3d& uvz) const {
     const double step = std::clamp(voxel_size_ * view.camera.intrinsics.fx / uvz.z(), 1.0, kFarthestOutline);
     const auto near = [&](double u, double v) {
@@ -152,8 +161,9 @@ class Voting {
   }
 
   Vote without_depth(const PreparedView& view, const Vector3d& uvz) const {
-    const float opacity =
-        view.opacity.empty() ? 1.0f : *view.opacity.pixel(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
+    const float opacity = view.opacity.empty()
+                              ? 1.0f
+                              : *view.opacity.pixel(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
     if (!(opacity < free_opacity_) || beside_surface(view, uvz)) return {};
     return {band_, free_weight_, false};
   }
@@ -164,7 +174,7 @@ class Voting {
     return distance > flat ? 1.0f : (distance + band_) / (flat + band_);
   }
 
-  float band_, free_opacity_;
+  float band_, free_opacity_, support_;
   double voxel_size_;
   float free_weight_;
 };
@@ -218,19 +228,20 @@ class Fusion {
     MaskTree places;
     for_each_batch([&](const std::vector<PreparedView>& batch) {
       std::vector<MaskTree> of_view(batch.size());
-      parallel_for(static_cast<std::int64_t>(batch.size()), context_.thread_count(), [&](std::int64_t v, int) {
-        context_.throw_if_cancelled();
-        mark(batch[v], of_view[v]);
-      });
+      parallel_for(static_cast<std::int64_t>(batch.size()), context_.thread_count(),
+                   [&](std::int64_t v, int) {
+                     context_.throw_if_cancelled();
+                     mark(batch[v], of_view[v]);
+                   });
       for (const MaskTree& mask : of_view) places.topologyUnion(mask);
     });
-    if (places.empty())
-      throw InvalidInput("no view has depth in the box: there is no surface to make");
-    openvdb::tools::dilateActiveValues(places, static_cast<int>(std::ceil(options_.band)),
-                                       openvdb::tools::NN_FACE_EDGE_VERTEX,
-                                       openvdb::tools::IGNORE_TILES);  // others would make tiles of full leaves
+    if (places.empty()) throw InvalidInput("no view has depth in the box: there is no surface to make");
+    openvdb::tools::dilateActiveValues(
+        places, static_cast<int>(std::ceil(options_.band)), openvdb::tools::NN_FACE_EDGE_VERTEX,
+        openvdb::tools::IGNORE_TILES);  // others would make tiles of full leaves
     check_size(places);
-    voxels_->distance = std::make_shared<openvdb::FloatTree>(places, static_cast<float>(voxels_->band), openvdb::TopologyCopy());
+    voxels_->distance = std::make_shared<openvdb::FloatTree>(places, static_cast<float>(voxels_->band),
+                                                             openvdb::TopologyCopy());
     voxels_->weight = std::make_shared<openvdb::FloatTree>(places, 0.0f, openvdb::TopologyCopy());
     voxels_->views = std::make_shared<openvdb::FloatTree>(places, 0.0f, openvdb::TopologyCopy());
   }
@@ -253,14 +264,16 @@ class Fusion {
     if (bytes <= options_.most_bytes) return;
     throw InvalidInput("the surface's lattice of voxels of " + std::to_string(options_.voxel_size) +
                        " would take " + std::to_string(bytes >> 20) + " MiB: found more than " +
-                       std::to_string(options_.most_bytes >> 20) + " MiB, expected larger voxels or less to fuse");
+                       std::to_string(options_.most_bytes >> 20) +
+                       " MiB, expected larger voxels or less to fuse");
   }
 
   void gather_votes() {
     using Manager = openvdb::tree::LeafManager<openvdb::FloatTree>;
     const Manager distance(*voxels_->distance), weight(*voxels_->weight), views(*voxels_->views);
     const std::int64_t leaves = static_cast<std::int64_t>(distance.leafCount());
-    parallel_for(leaves, context_.thread_count(), [&](std::int64_t i, int) { distance.leaf(i).buffer().fill(0); });
+    parallel_for(leaves, context_.thread_count(),
+                 [&](std::int64_t i, int) { distance.leaf(i).buffer().fill(0); });
     const Voting vote(options_);
     for_each_batch([&](const std::vector<PreparedView>& batch) {
       parallel_for(leaves, context_.thread_count(), [&](std::int64_t i, int) {

@@ -21,7 +21,8 @@ std::vector<FusionView> ball_views() {
 
 DistanceField fused(const std::vector<FusionView>& views, const FusionOptions& options, int threads = 2) {
   RunContext context(threads);
-  return fuse_depth(static_cast<int>(views.size()), [&](int v) { return views[v]; }, options, context);
+  return fuse_depth(
+      static_cast<int>(views.size()), [&](int v) { return views[v]; }, options, context);
 }
 
 /// A camera at the origin that sees a wall at that distance everywhere.
@@ -119,7 +120,9 @@ TEST(DepthFusion, NoDepthAndTooMuchOfItAreErrors) {
 TEST(DepthFusion, CanBeCancelled) {
   RunContext context(1);
   context.cancel();
-  EXPECT_THROW(fuse_depth(1, [](int) { return wall(2.0f, 0.01f); }, wall_options(), context), Cancelled);
+  EXPECT_THROW(fuse_depth(
+                   1, [](int) { return wall(2.0f, 0.01f); }, wall_options(), context),
+               Cancelled);
 }
 
 TEST(DepthFusion, SmoothingPullsAtNoise) {

@@ -21,7 +21,8 @@ constexpr int kSmoothRounds = 6;
 const std::array<Coord, 6> kNeighbours{Coord(1, 0, 0),  Coord(-1, 0, 0), Coord(0, 1, 0),
                                        Coord(0, -1, 0), Coord(0, 0, 1),  Coord(0, 0, -1)};
 
-/// Corners whose distance is to be found, each with its neighbours: those of the list by number, others by value.
+/// Corners whose distance is to be found, each with its neighbours: those of the list by number, others by
+/// value.
 struct Unknowns {
   std::vector<Coord> places;
   std::vector<std::array<std::int32_t, 6>> neighbours;  ///< -1: not one of them
@@ -31,8 +32,8 @@ struct Unknowns {
 
 /// Every active corner for which is_unknown(weight); `is_given(weight)` says whose distances count.
 template <class IsUnknown, class IsGiven>
-Unknowns find_unknowns(const DistanceField::Voxels& voxels, const IsUnknown& is_unknown, const IsGiven& is_given,
-                       int threads) {
+Unknowns find_unknowns(const DistanceField::Voxels& voxels, const IsUnknown& is_unknown,
+                       const IsGiven& is_given, int threads) {
   Unknowns out;
   openvdb::Int32Tree number(*voxels.weight, -1, openvdb::TopologyCopy());
   openvdb::tree::ValueAccessor<openvdb::Int32Tree> numbers(number);
@@ -45,18 +46,21 @@ Unknowns find_unknowns(const DistanceField::Voxels& voxels, const IsUnknown& is_
   out.neighbours.resize(out.places.size());
   out.given_sum.resize(out.places.size());
   out.given_count.resize(out.places.size());
-  parallel_for_blocks(std::ssize(out.places), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
-    const openvdb::tree::ValueAccessor<const openvdb::Int32Tree> own(number);
-    const openvdb::tree::ValueAccessor<const FloatTree> weight(*voxels.weight), distance(*voxels.distance);
-    for (std::int64_t i = begin; i < end; ++i)
-      for (int k = 0; k < 6; ++k) {
-        const Coord at = out.places[i] + kNeighbours[k];
-        out.neighbours[i][k] = weight.isValueOn(at) ? own.getValue(at) : -1;
-        if (out.neighbours[i][k] >= 0 || !weight.isValueOn(at) || !is_given(weight.getValue(at))) continue;
-        out.given_sum[i] += distance.getValue(at);
-        ++out.given_count[i];
-      }
-  });
+  parallel_for_blocks(
+      std::ssize(out.places), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+        const openvdb::tree::ValueAccessor<const openvdb::Int32Tree> own(number);
+        const openvdb::tree::ValueAccessor<const FloatTree> weight(*voxels.weight),
+            distance(*voxels.distance);
+        for (std::int64_t i = begin; i < end; ++i)
+          for (int k = 0; k < 6; ++k) {
+            const Coord at = out.places[i] + kNeighbours[k];
+            out.neighbours[i][k] = weight.isValueOn(at) ? own.getValue(at) : -1;
+            if (out.neighbours[i][k] >= 0 || !weight.isValueOn(at) || !is_given(weight.getValue(at)))
+              continue;
+            out.given_sum[i] += distance.getValue(at);
+            ++out.given_count[i];
+          }
+      });
   return out;
 }
 
@@ -90,7 +94,8 @@ void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads
   const openvdb::tree::ValueAccessor<const FloatTree> weights(*voxels.weight), distances(*voxels.distance);
   for (std::size_t i = 0; i < measured.size(); ++i) {
     measured[i] = distances.getValue(all.places[i]);
-    certainty[i] = static_cast<float>(weights.getValue(all.places[i]) * voxels.voxel_size * voxels.voxel_size);
+    certainty[i] =
+        static_cast<float>(weights.getValue(all.places[i]) * voxels.voxel_size * voxels.voxel_size);
   }
   now = measured;
   for (int round = 0; round < kSmoothRounds; ++round) {

@@ -19,12 +19,12 @@ struct DistanceField::Voxels {
   }
 };
 
-/// Pulls distances towards those of their neighbours, the more the less sure they are: screened smoothing, a few
-/// rounds, all corners at once. The weight of a neighbour is `strength` per step squared.
+/// Pulls distances towards those of their neighbours, the more the less sure they are: screened smoothing, a
+/// few rounds, all corners at once. The weight of a neighbour is `strength` per step squared.
 void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads);
 
-/// Carries distances on to corners that nobody saw, around the places where seen surface ends, so far that what
-/// comes from both sides of a hole meets: diffusion [Davis02]. Those get DistanceField::kFilled views.
+/// Carries distances on to corners that nobody saw, around the places where seen surface ends, so far that
+/// what comes from both sides of a hole meets: diffusion [Davis02]. Those get DistanceField::kFilled views.
 void fill_unseen(DistanceField::Voxels& voxels, double hole_size, int threads);
 
 }  // namespace roxel

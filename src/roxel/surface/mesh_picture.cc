@@ -71,14 +71,14 @@ HitColor point_colors(const Surface& surface) {
     Color sum{};
     for (int k = 0; k < 3; ++k)
       for (int c = 0; c < 3; ++c)
-        sum[c] += static_cast<float>(hit.corners[k]) *
-                  surface.colors[surface.mesh.triangles[hit.triangle][k]][c];
+        sum[c] +=
+            static_cast<float>(hit.corners[k]) * surface.colors[surface.mesh.triangles[hit.triangle][k]][c];
     return sum;
   };
 }
 
-PinholeCamera orbit_camera(const Vector3d& middle, double radius, const Vector3d& direction, const Vector3d& up,
-                           int size_px) {
+PinholeCamera orbit_camera(const Vector3d& middle, double radius, const Vector3d& direction,
+                           const Vector3d& up, int size_px) {
   constexpr double kDistance = 4;  // radii; the ball's outline then is at 1 / sqrt(kDistance^2 - 1)
   PinholeCamera camera;
   const double f = 0.49 * size_px * std::sqrt(kDistance * kDistance - 1);

@@ -30,8 +30,8 @@ Image colored_picture(const MeshRays& rays, const PinholeCamera& camera, const H
 /// Colours between a triangle's points; the surface must have colours and outlive the function.
 HitColor point_colors(const Surface& surface);
 
-/// A camera that looks at the middle of a ball from `direction` (from the middle to the camera), so that it fills
-/// the square picture; `up` is up in the picture.
+/// A camera that looks at the middle of a ball from `direction` (from the middle to the camera), so that it
+/// fills the square picture; `up` is up in the picture.
 PinholeCamera orbit_camera(const Eigen::Vector3d& middle, double radius, const Eigen::Vector3d& direction,
                            const Eigen::Vector3d& up, int size_px);
 

@@ -62,7 +62,8 @@ MeshRays::MeshRays(const Mesh& mesh) : state_(new State) {
 
 MeshRays::~MeshRays() = default;
 
-std::optional<MeshHit> MeshRays::trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+std::optional<MeshHit> MeshRays::trace(const Eigen::Vector3d& origin,
+                                       const Eigen::Vector3d& direction) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query{};

@@ -9,14 +9,14 @@
 namespace roxel {
 namespace {
 
-constexpr int kSteps = 4;          ///< looks along an edge, less one
-constexpr float kMost = 0.3f;      ///< no correction is larger, display values
-constexpr double kAnchor = 1e-4;   ///< keeps the mean where it is
+constexpr int kSteps = 4;         ///< looks along an edge, less one
+constexpr float kMost = 0.3f;     ///< no correction is larger, display values
+constexpr double kAnchor = 1e-4;  ///< keeps the mean where it is
 
 /// Calls visit(f, k, g) for every edge k of a triangle f over which another view's triangle g lies.
 template <class Visit>
-void for_each_seam_side(const std::vector<std::array<std::int32_t, 3>>& neighbours, const std::vector<int>& labels,
-                        const Visit& visit) {
+void for_each_seam_side(const std::vector<std::array<std::int32_t, 3>>& neighbours,
+                        const std::vector<int>& labels, const Visit& visit) {
   for (std::size_t f = 0; f < labels.size(); ++f)
     for (int k = 0; k < 3; ++k) {
       const std::int32_t g = neighbours[f][k];
@@ -75,7 +75,8 @@ SeamColors::SeamColors(const Mesh& mesh, const std::vector<std::array<std::int32
     edges_.push_back({labels[f], points.of_face[f][k], points.of_face[f][next],
                       mesh.points[mesh.triangles[f][k]], mesh.points[mesh.triangles[f][next]]});
   });
-  std::stable_sort(edges_.begin(), edges_.end(), [](const Edge& a, const Edge& b) { return a.view < b.view; });
+  std::stable_sort(edges_.begin(), edges_.end(),
+                   [](const Edge& a, const Edge& b) { return a.view < b.view; });
 }
 
 void SeamColors::add(int view, const PinholeCamera& camera, const Image& display) {
@@ -128,7 +129,8 @@ std::vector<Rgb> seam_corrections(const ChartPoints& points, const std::vector<S
   Eigen::SparseMatrix<double> matrix(count, count);
   matrix.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
-  if (solver.info() != Eigen::Success) throw NumericalError("seams of the texture: the system cannot be solved");
+  if (solver.info() != Eigen::Success)
+    throw NumericalError("seams of the texture: the system cannot be solved");
   const Eigen::MatrixX3d solution = solver.solve(right);
   for (Eigen::Index i = 0; i < count; ++i)
     for (int c = 0; c < 3; ++c) out[i][c] = std::clamp(static_cast<float>(solution(i, c)), -kMost, kMost);

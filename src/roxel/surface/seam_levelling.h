@@ -1,12 +1,13 @@
 #pragma once
-/// Corrections of colour that make neighbouring charts meet: a value a point and chart, small differences within a
-/// chart, the seam's difference across it [Lempitsky07].
+/// Corrections of colour that make neighbouring charts meet: a value a point and chart, small differences
+/// within a chart, the seam's difference across it [Lempitsky07].
 
 #include "roxel/surface/view_choice.h"
 
 namespace roxel {
 
-/// Points of a surface as the charts have them: a point that charts of several views meet at counts once for each.
+/// Points of a surface as the charts have them: a point that charts of several views meet at counts once for
+/// each.
 struct ChartPoints {
   std::vector<std::array<std::int32_t, 3>> of_face;  ///< numbers of a triangle's corners; -1: no view
   std::vector<std::uint32_t> point;                  ///< of the surface
@@ -42,9 +43,9 @@ class SeamColors {
   std::vector<float> weights_;
 };
 
-/// What is to be added to the display values of each chart point: least squares over seams (difference 0 after
-/// it) and edges within charts (no difference, `smoothness` times as important). Throws NumericalError where the
-/// system cannot be solved.
+/// What is to be added to the display values of each chart point: least squares over seams (difference 0
+/// after it) and edges within charts (no difference, `smoothness` times as important). Throws NumericalError
+/// where the system cannot be solved.
 std::vector<Rgb> seam_corrections(const ChartPoints& points, const std::vector<Seam>& seams,
                                   const std::vector<Rgb>& seam_colors, double smoothness = 0.1);
 

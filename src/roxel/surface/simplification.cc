@@ -16,7 +16,8 @@ std::vector<float> centred_positions(const Mesh& mesh) {
   std::vector<float> positions;
   positions.reserve(3 * mesh.points.size());
   for (const Eigen::Vector3d& x : mesh.points)
-    for (int axis = 0; axis < 3; ++axis) positions.push_back(static_cast<float>(x[axis] - box.center()[axis]));
+    for (int axis = 0; axis < 3; ++axis)
+      positions.push_back(static_cast<float>(x[axis] - box.center()[axis]));
   return positions;
 }
 
@@ -34,14 +35,14 @@ Surface simplified(const Surface& surface, const SimplificationOptions& options)
   const double scale = meshopt_simplifyScale(positions.data(), mesh.points.size(), kStride);
   const double error = options.triangles ? 1.0 : options.error / scale;
   std::vector<unsigned> left(corners.size());
-  left.resize(meshopt_simplify(left.data(), corners.data(), corners.size(), positions.data(), mesh.points.size(),
-                               kStride, static_cast<std::size_t>(3 * wanted), static_cast<float>(error), 0,
-                               nullptr));
+  left.resize(meshopt_simplify(left.data(), corners.data(), corners.size(), positions.data(),
+                               mesh.points.size(), kStride, static_cast<std::size_t>(3 * wanted),
+                               static_cast<float>(error), 0, nullptr));
   const auto count = static_cast<std::int64_t>(left.size() / 3);
   if (options.triangles && count > wanted)
-    throw InvalidInput("a surface of " + std::to_string(mesh.triangles.size()) + " triangles: found a target of " +
-                       std::to_string(wanted) + ", expected at least " + std::to_string(count) +
-                       ", the fewest that its parts can be drawn with");
+    throw InvalidInput("a surface of " + std::to_string(mesh.triangles.size()) +
+                       " triangles: found a target of " + std::to_string(wanted) + ", expected at least " +
+                       std::to_string(count) + ", the fewest that its parts can be drawn with");
   Surface fewer = surface;
   fewer.mesh.triangles.clear();
   for (std::size_t t = 0; t + 2 < left.size(); t += 3)

@@ -10,11 +10,11 @@ namespace roxel {
 
 struct SimplificationOptions {
   std::optional<std::int64_t> triangles;  ///< most that are left; none: as few as the error allows
-  double error = 0;                       ///< how far the surface may move, world units; not asked for with a target
+  double error = 0;  ///< how far the surface may move, world units; not asked for with a target
 };
 
-/// Points that stay keep their place and attributes. Throws InvalidInput where the target cannot be reached: a
-/// closed surface needs some triangles a part. The same for any number of threads.
+/// Points that stay keep their place and attributes. Throws InvalidInput where the target cannot be reached:
+/// a closed surface needs some triangles a part. The same for any number of threads.
 Surface simplified(const Surface& surface, const SimplificationOptions& options);
 
 }  // namespace roxel

@@ -13,16 +13,16 @@ struct Surface {
   std::vector<std::array<float, 3>> colors;  ///< linear RGB, 1 = white
 };
 
-/// Normals of the points: those of their triangles, weighted by the angle at the point [Thuermer98]. Zero where
-/// a point has no triangle with an area.
+/// Normals of the points: those of their triangles, weighted by the angle at the point [Thuermer98]. Zero
+/// where a point has no triangle with an area.
 std::vector<Eigen::Vector3f> point_normals(const Mesh& mesh);
 
 /// The triangles for which `keep` is not 0, and the points that they use, all in their old order. Attributes
 /// follow. `keep` has an entry a triangle.
 Surface kept_triangles(const Surface& surface, const std::vector<std::uint8_t>& keep);
 
-/// Up to three triangles that share an edge with a triangle, -1 where there is none; entry k is over the edge from
-/// corner k to corner k + 1. Where more than two share an edge, they are joined in pairs.
+/// Up to three triangles that share an edge with a triangle, -1 where there is none; entry k is over the edge
+/// from corner k to corner k + 1. Where more than two share an edge, they are joined in pairs.
 std::vector<std::array<std::int32_t, 3>> face_neighbours(const Mesh& mesh);
 
 /// Parts of a surface that hang together by points, numbered in the order of their first triangles.

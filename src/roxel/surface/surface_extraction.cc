@@ -20,7 +20,8 @@ struct LatticeMesh {
 
 double squared(const openvdb::Vec3s& a, const openvdb::Vec3s& b) { return (a - b).lengthSqr(); }
 
-/// Two triangles along the shorter diagonal. The outside (distance > 0) sees OpenVDB's corners counterclockwise.
+/// Two triangles along the shorter diagonal. The outside (distance > 0) sees OpenVDB's corners
+/// counterclockwise.
 void add_quad(const openvdb::Vec4I& q, LatticeMesh& mesh) {
   const auto& p = mesh.points;
   if (squared(p[q[0]], p[q[2]]) <= squared(p[q[1]], p[q[3]])) {
@@ -134,7 +135,8 @@ std::int64_t drop_small_parts(const LatticeMesh& mesh, const Mesh& topology, dou
   return dropped;
 }
 
-/// Adds what closes small holes: weak pieces all of whose edges lie on kept surface. Returns how many triangles.
+/// Adds what closes small holes: weak pieces all of whose edges lie on kept surface. Returns how many
+/// triangles.
 std::int64_t close_holes(const LatticeMesh& mesh, const Mesh& topology, const std::vector<Support>& support,
                          double hole_size, std::vector<std::uint8_t>& keep) {
   std::vector<std::uint8_t> weak(keep.size());
@@ -142,13 +144,19 @@ std::int64_t close_holes(const LatticeMesh& mesh, const Mesh& topology, const st
   const Components pieces = connected_components(topology, weak);
   std::vector<double> sides = extents(mesh, pieces);
   const auto neighbours = face_neighbours(topology);
-  for (std::size_t t = 0; t < keep.size(); ++t)
-    if (weak[t])
-      for (const std::int32_t n : neighbours[t])
-        if (n < 0 || !(keep[n] || weak[n])) sides[pieces.of_triangle[t]] = std::numeric_limits<double>::infinity();
+  std::vector<std::uint8_t> rimmed(
+      pieces.count);  // a closed piece that touches nothing is no hole, but debris
+  for (std::size_t t = 0; t < keep.size(); ++t) {
+    if (!weak[t]) continue;
+    for (const std::int32_t n : neighbours[t]) {
+      if (n >= 0 && keep[n]) rimmed[pieces.of_triangle[t]] = 1;
+      if (n < 0 || !(keep[n] || weak[n]))
+        sides[pieces.of_triangle[t]] = std::numeric_limits<double>::infinity();
+    }
+  }
   std::int64_t closed = 0;
   for (std::size_t t = 0; t < keep.size(); ++t)
-    if (weak[t] && sides[pieces.of_triangle[t]] <= hole_size) {
+    if (weak[t] && rimmed[pieces.of_triangle[t]] && sides[pieces.of_triangle[t]] <= hole_size) {
       keep[t] = 1;
       ++closed;
     }

@@ -14,10 +14,10 @@ struct ExtractionOptions {
 };
 
 struct Extraction {
-  Surface surface;                    ///< without normals and colours
-  std::int64_t unsupported = 0;       ///< triangles left out: too few views
-  std::int64_t debris = 0;            ///< triangles left out: part of something small
-  std::int64_t closed = 0;            ///< triangles that close holes
+  Surface surface;               ///< without normals and colours
+  std::int64_t unsupported = 0;  ///< triangles left out: too few views
+  std::int64_t debris = 0;       ///< triangles left out: part of something small
+  std::int64_t closed = 0;       ///< triangles that close holes
 };
 
 /// One point for each cell of the lattice that the surface goes through. The same for any number of threads.

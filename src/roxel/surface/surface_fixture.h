@@ -17,8 +17,8 @@ inline std::vector<PinholeCamera> cameras_around(int count = 8, int size_px = 96
   std::vector<PinholeCamera> cameras;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d direction(i & 1 ? 1 : -1, i & 2 ? 1 : -1, (i & 4 ? 1 : -1) * 0.7);
-    cameras.push_back(orbit_camera(Eigen::Vector3d::Zero(), 1.2 * kBallRadius, direction, Eigen::Vector3d::UnitZ(),
-                                   size_px));
+    cameras.push_back(orbit_camera(Eigen::Vector3d::Zero(), 1.2 * kBallRadius, direction,
+                                   Eigen::Vector3d::UnitZ(), size_px));
   }
   return cameras;
 }
@@ -35,7 +35,8 @@ inline std::optional<double> meet_ball(const Ray& ray) {
 /// The ball's depth, of that variance; opacity 0 beside it.
 inline FusionView ball_view(const PinholeCamera& camera, float variance = 1e-4f) {
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;
-  FusionView view{camera, Image(width, height, 1), Image(width, height, 1, variance), Image(width, height, 1), {}};
+  FusionView view{
+      camera, Image(width, height, 1), Image(width, height, 1, variance), Image(width, height, 1), {}};
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       if (const auto t = meet_ball(camera.ray(x + 0.5, y + 0.5))) {

@@ -32,7 +32,8 @@ TEST(Surface, NormalsOfABallAreItsRadii) {
 
 TEST(Surface, KeepingTrianglesDropsPointsThatNobodyUses) {
   const Surface kept = kept_triangles(three_triangles(), {0, 0, 1});
-  EXPECT_THAT(kept.mesh.points, testing::ElementsAre(Vector3d(5, 0, 0), Vector3d(6, 0, 0), Vector3d(5, 1, 0)));
+  EXPECT_THAT(kept.mesh.points,
+              testing::ElementsAre(Vector3d(5, 0, 0), Vector3d(6, 0, 0), Vector3d(5, 1, 0)));
   EXPECT_EQ(kept.normals.size(), 3u);
   EXPECT_EQ(kept.mesh.triangles[0], (std::array<std::uint32_t, 3>{0, 1, 2}));
 }
@@ -63,7 +64,9 @@ TEST(Simplification, ReachesItsTargetAndKeepsTheShape) {
 
 TEST(Simplification, TheErrorBoundsIt) {
   const Surface ball = fixture::ball_mesh(20);
-  const auto count = [&](double error) { return simplified(ball, {std::nullopt, error}).mesh.triangles.size(); };
+  const auto count = [&](double error) {
+    return simplified(ball, {std::nullopt, error}).mesh.triangles.size();
+  };
   EXPECT_GT(count(0.001), count(0.01));
   EXPECT_GT(count(0.01), count(0.1));
   EXPECT_EQ(simplified(ball, {1000000, 0}).mesh.triangles.size(), ball.mesh.triangles.size());
@@ -90,7 +93,9 @@ TEST(MeshPicture, ABallFillsItsOrbitPicture) {
   const Image shaded = shaded_picture(ball, rays, camera, {1, 2});
   const Image colored = colored_picture(rays, camera, point_colors(ball), {1, 2});
   const float background = MeshPictureOptions{}.background[2];
-  const auto is_background = [&](const Image& picture, int x, int y) { return picture.pixel(x, y)[2] == background; };
+  const auto is_background = [&](const Image& picture, int x, int y) {
+    return picture.pixel(x, y)[2] == background;
+  };
   EXPECT_TRUE(is_background(shaded, 1, 1));
   EXPECT_FALSE(is_background(shaded, 2, 32));
   EXPECT_FALSE(is_background(shaded, 61, 32));

@@ -15,9 +15,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int kPadding = 2;        ///< texels around a chart that continue its photograph
-constexpr int kUnseenSide = 4;     ///< texels along the side of a triangle that no photograph shows
-constexpr double kShrink = 0.93;   ///< of charts, from one try to make them fit to the next
+constexpr int kPadding = 2;       ///< texels around a chart that continue its photograph
+constexpr int kUnseenSide = 4;    ///< texels along the side of a triangle that no photograph shows
+constexpr double kShrink = 0.93;  ///< of charts, from one try to make them fit to the next
 
 /// Triangles that hang together and take their texture from one view.
 struct Chart {
@@ -63,7 +63,8 @@ class FlatTriangle {
   std::array<double, 3> weights(const Vector2d& at) const {
     if (inverse_ == 0) return {1.0 / 3, 1.0 / 3, 1.0 / 3};
     const Vector2d p = corners_[1] - corners_[0], q = corners_[2] - corners_[0], d = at - corners_[0];
-    const double s = (d.x() * q.y() - d.y() * q.x()) * inverse_, t = (p.x() * d.y() - p.y() * d.x()) * inverse_;
+    const double s = (d.x() * q.y() - d.y() * q.x()) * inverse_,
+                 t = (p.x() * d.y() - p.y() * d.x()) * inverse_;
     return {1 - s - t, s, t};
   }
   Eigen::AlignedBox2d box() const {
@@ -122,7 +123,8 @@ class Texturing {
     labels_ = choose_views(neighbours_, views, choice);
     out_.unseen = std::count(labels_.begin(), labels_.end(), kNoView);
     charts_ = find_charts(neighbours_, labels_);
-    out_.charts = std::count_if(charts_.begin(), charts_.end(), [](const Chart& c) { return c.view != kNoView; });
+    out_.charts =
+        std::count_if(charts_.begin(), charts_.end(), [](const Chart& c) { return c.view != kNoView; });
     points_ = chart_points(mesh(), labels_);
     seams_ = seams(mesh(), neighbours_, labels_, points_);
   }
@@ -237,7 +239,8 @@ class Texturing {
     double sum = 0;
     for (const Seam& seam : seams_)
       for (int c = 0; c < 3; ++c) {
-        const double d = colors[seam.a][c] + corrections_[seam.a][c] - colors[seam.b][c] - corrections_[seam.b][c];
+        const double d =
+            colors[seam.a][c] + corrections_[seam.a][c] - colors[seam.b][c] - corrections_[seam.b][c];
         sum += d * d;
       }
     return seams_.empty() ? 0.0 : std::sqrt(sum / (3.0 * static_cast<double>(seams_.size())));
@@ -357,7 +360,8 @@ std::function<Rgb(const MeshHit&)> texture_colors(const TexturedSurface& texture
     Eigen::Vector2d at = Eigen::Vector2d::Zero();
     for (int k = 0; k < 3; ++k)
       at += hit.corners[k] * textured.uvs[textured.uv_corners[hit.triangle][k]].cast<double>();
-    Rgb color = bilinear(textured.picture, at.x() * textured.picture.width(), at.y() * textured.picture.height());
+    Rgb color =
+        bilinear(textured.picture, at.x() * textured.picture.width(), at.y() * textured.picture.height());
     for (float& value : color) value = srgb_decode(value);
     return color;
   };

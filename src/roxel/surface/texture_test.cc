@@ -20,7 +20,8 @@ struct Ball {
   std::vector<TextureView> views;
   explicit Ball(std::vector<float> lights = std::vector<float>(8, 1.0f)) {
     const auto cameras = fixture::cameras_around(8, 160);
-    for (std::size_t v = 0; v < cameras.size(); ++v) views.push_back(fixture::ball_photograph(cameras[v], lights[v]));
+    for (std::size_t v = 0; v < cameras.size(); ++v)
+      views.push_back(fixture::ball_photograph(cameras[v], lights[v]));
   }
   TextureViewLoader loader() const {
     return [this](int v) { return views[v]; };
@@ -135,7 +136,9 @@ TEST(TextureViews, AViewSeesItsSideOfTheBall) {
   const auto views = face_views(ball.mesh.mesh, rays, 8, ball.loader(), sight, context);
   for (std::size_t f = 0; f < views.size(); ++f)
     for (const FaceView& seen : views[f])
-      EXPECT_GT(ball.mesh.mesh.points[ball.mesh.mesh.triangles[f][0]].dot(ball.views[seen.view].camera.pose.centre), 0);
+      EXPECT_GT(
+          ball.mesh.mesh.points[ball.mesh.mesh.triangles[f][0]].dot(ball.views[seen.view].camera.pose.centre),
+          0);
   const std::vector<Rgb> gains(8, Rgb{1, 1, 1}), none(ball.mesh.mesh.points.size(), Rgb{});
   const auto colors = photograph_colors(ball.mesh, rays, 8, ball.loader(), gains, none, sight, context);
   for (std::size_t i = 0; i < colors.size(); ++i)
@@ -172,7 +175,8 @@ TEST(ViewChoice, TwoViewsThatDifferAreBothKept) {
 }
 
 TEST(ViewChoice, BlurredPhotographsCountLess) {
-  std::vector<std::vector<FaceView>> views{{{0, 1, {}, 0.2f}, {1, 1, {}, 0.01f}, {2, 1, {}, 0.2f}, {3, 1, {}, 5}}};
+  std::vector<std::vector<FaceView>> views{
+      {{0, 1, {}, 0.2f}, {1, 1, {}, 0.01f}, {2, 1, {}, 0.2f}, {3, 1, {}, 5}}};
   weigh_sharpness(views, 1);
   EXPECT_NEAR(views[0][0].quality, 1, 1e-6);
   EXPECT_NEAR(views[0][1].quality, 1.0 / 3, 1e-6);
@@ -189,7 +193,8 @@ TEST(SeamLevelling, BothSidesMeetHalfWay) {
   const auto found = seams(mesh, face_neighbours(mesh), labels, points);
   ASSERT_EQ(found.size(), 2u);
   std::vector<Rgb> colors(6, Rgb{});
-  for (std::size_t i = 0; i < 6; ++i) colors[i] = points.view[i] == 0 ? Rgb{0.4f, 0.4f, 0.4f} : Rgb{0.6f, 0.4f, 0.4f};
+  for (std::size_t i = 0; i < 6; ++i)
+    colors[i] = points.view[i] == 0 ? Rgb{0.4f, 0.4f, 0.4f} : Rgb{0.6f, 0.4f, 0.4f};
   const std::vector<Rgb> added = seam_corrections(points, found, colors);
   for (const Seam& seam : found) {
     EXPECT_NEAR(colors[seam.a][0] + added[seam.a][0], colors[seam.b][0] + added[seam.b][0], 1e-3);

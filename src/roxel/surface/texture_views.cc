@@ -112,13 +112,17 @@ Rgb mean_color(const Surface& surface, std::size_t face) {
 }  // namespace
 
 Rgb bilinear(const Image& image, double u, double v) {
-  const double x = std::clamp(u - 0.5, 0.0, image.width() - 1.0), y = std::clamp(v - 0.5, 0.0, image.height() - 1.0);
-  const int x0 = std::min(static_cast<int>(x), image.width() - 1), y0 = std::min(static_cast<int>(y), image.height() - 1);
+  const double x = std::clamp(u - 0.5, 0.0, image.width() - 1.0),
+               y = std::clamp(v - 0.5, 0.0, image.height() - 1.0);
+  const int x0 = std::min(static_cast<int>(x), image.width() - 1),
+            y0 = std::min(static_cast<int>(y), image.height() - 1);
   const int x1 = std::min(x0 + 1, image.width() - 1), y1 = std::min(y0 + 1, image.height() - 1);
   const auto s = static_cast<float>(x - x0), t = static_cast<float>(y - y0);
-  const float *a = image.pixel(x0, y0), *b = image.pixel(x1, y0), *c = image.pixel(x0, y1), *d = image.pixel(x1, y1);
+  const float *a = image.pixel(x0, y0), *b = image.pixel(x1, y0), *c = image.pixel(x0, y1),
+              *d = image.pixel(x1, y1);
   Rgb out;
-  for (int k = 0; k < 3; ++k) out[k] = (1 - t) * ((1 - s) * a[k] + s * b[k]) + t * ((1 - s) * c[k] + s * d[k]);
+  for (int k = 0; k < 3; ++k)
+    out[k] = (1 - t) * ((1 - s) * a[k] + s * b[k]) + t * ((1 - s) * c[k] + s * d[k]);
   return out;
 }
 
@@ -153,21 +157,21 @@ std::vector<Rgb> photograph_colors(const Surface& surface, const MeshRays& rays,
     context.throw_if_cancelled();
     const TextureView view = checked(load(v));
     const Onlooker onlooker(view, rays, options);
-    parallel_for_blocks(std::ssize(sums), kGrain, context.thread_count(),
-                        [&](std::int64_t begin, std::int64_t end, int) {
-                          for (std::int64_t i = begin; i < end; ++i) {
-                            const Vector3d& x = surface.mesh.points[i];
-                            const double cosine = surface.normals[i].cast<double>().dot(
-                                (view.camera.pose.centre - x).normalized());
-                            if (!(cosine > options.least_cosine)) continue;
-                            const auto seen = onlooker.see(x);
-                            if (!seen) continue;
-                            const Rgb color = bilinear(view.rgb, seen->x(), seen->y());
-                            const auto weight = static_cast<float>(cosine * cosine);
-                            for (int c = 0; c < 3; ++c) sums[i][c] += weight * gains[v][c] * color[c];
-                            weights[i] += weight;
-                          }
-                        });
+    parallel_for_blocks(
+        std::ssize(sums), kGrain, context.thread_count(), [&](std::int64_t begin, std::int64_t end, int) {
+          for (std::int64_t i = begin; i < end; ++i) {
+            const Vector3d& x = surface.mesh.points[i];
+            const double cosine =
+                surface.normals[i].cast<double>().dot((view.camera.pose.centre - x).normalized());
+            if (!(cosine > options.least_cosine)) continue;
+            const auto seen = onlooker.see(x);
+            if (!seen) continue;
+            const Rgb color = bilinear(view.rgb, seen->x(), seen->y());
+            const auto weight = static_cast<float>(cosine * cosine);
+            for (int c = 0; c < 3; ++c) sums[i][c] += weight * gains[v][c] * color[c];
+            weights[i] += weight;
+          }
+        });
   }
   for (std::size_t i = 0; i < count; ++i)
     for (int c = 0; c < 3; ++c) sums[i][c] = weights[i] > 0 ? sums[i][c] / weights[i] : fallback[i][c];

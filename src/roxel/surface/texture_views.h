@@ -1,5 +1,6 @@
 #pragma once
-/// What each view shows of each triangle of a surface: the ground on which texturing chooses (docs/surface.md).
+/// What each view shows of each triangle of a surface: the ground on which texturing chooses
+/// (docs/surface.md).
 
 #include <functional>
 
@@ -41,16 +42,16 @@ std::vector<std::vector<FaceView>> face_views(const Mesh& mesh, const MeshRays& 
                                               const TextureViewLoader& load, const SightOptions& options,
                                               RunContext& context);
 
-/// Colours of the surface's points as the photographs show them: mean over the views that see them, weighted by
-/// the square of the cosine; `fallback` (one a point) where none does. Each view's light is multiplied by its
-/// gain.
+/// Colours of the surface's points as the photographs show them: mean over the views that see them, weighted
+/// by the square of the cosine; `fallback` (one a point) where none does. Each view's light is multiplied by
+/// its gain.
 std::vector<Rgb> photograph_colors(const Surface& surface, const MeshRays& rays, int view_count,
                                    const TextureViewLoader& load, const std::vector<Rgb>& gains,
                                    const std::vector<Rgb>& fallback, const SightOptions& options,
                                    RunContext& context);
 
-/// What each view's light must be multiplied by, a channel, to show the surface as the points' colours do: the
-/// median over triangles. 1 where a view shows fewer than 20 triangles.
+/// What each view's light must be multiplied by, a channel, to show the surface as the points' colours do:
+/// the median over triangles. 1 where a view shows fewer than 20 triangles.
 std::vector<Rgb> light_gains(const Surface& surface, const std::vector<std::vector<FaceView>>& views,
                              int view_count);
 

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kMostViews = 12;  ///< candidates a triangle, the best ones
 constexpr float kPlain = 0.02f;         ///< detail that is granted to plain triangles
 constexpr float kLeastSharpness = 1.0f / 3, kMostSharpness = 1.25f;
-constexpr float kTie = 1e-4f;           ///< cost of a view by its number: equals are decided the same way everywhere
+constexpr float kTie = 1e-4f;  ///< cost of a view by its number: equals are decided the same way everywhere
 constexpr int kRounds = 24;
 constexpr int kSweeps = 10;
 constexpr float kDamping = 0.5f;
@@ -65,7 +65,8 @@ struct Choices {
       std::stable_sort(from.begin(), from.end(),
                        [](const FaceView& a, const FaceView& b) { return a.quality > b.quality; });
       from.resize(kMostViews);
-      std::sort(from.begin(), from.end(), [](const FaceView& a, const FaceView& b) { return a.view < b.view; });
+      std::sort(from.begin(), from.end(),
+                [](const FaceView& a, const FaceView& b) { return a.view < b.view; });
     }
     float best = 0;
     for (const FaceView& view : from) best = std::max(best, view.quality);
@@ -124,8 +125,8 @@ class Labelling {
     Costs message(own.size(), 0.0f);
     if (from < 0 || choices_[from].size() == 0) return message;
     const auto& back = neighbours_[from];
-    const int edge = static_cast<int>(std::find(back.begin(), back.end(), static_cast<std::int32_t>(face)) -
-                                      back.begin());
+    const int edge =
+        static_cast<int>(std::find(back.begin(), back.end(), static_cast<std::int32_t>(face)) - back.begin());
     const Costs sum = beliefs(from, edge);
     const float least = *std::min_element(sum.begin(), sum.end());
     const Choices& other = choices_[from];
@@ -140,14 +141,15 @@ class Labelling {
 
   void pass_messages() {
     auto next = messages_;
-    parallel_for_blocks(std::ssize(choices_), kGrain, threads_, [&](std::int64_t begin, std::int64_t end, int) {
-      for (std::int64_t f = begin; f < end; ++f)
-        for (int k = 0; k < 3; ++k) {
-          const Costs message = incoming(f, k);
-          for (std::size_t i = 0; i < message.size(); ++i)
-            next[f][k][i] = kDamping * next[f][k][i] + (1 - kDamping) * message[i];
-        }
-    });
+    parallel_for_blocks(std::ssize(choices_), kGrain, threads_,
+                        [&](std::int64_t begin, std::int64_t end, int) {
+                          for (std::int64_t f = begin; f < end; ++f)
+                            for (int k = 0; k < 3; ++k) {
+                              const Costs message = incoming(f, k);
+                              for (std::size_t i = 0; i < message.size(); ++i)
+                                next[f][k][i] = kDamping * next[f][k][i] + (1 - kDamping) * message[i];
+                            }
+                        });
     messages_.swap(next);
   }
 
@@ -195,19 +197,20 @@ void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads) {
 std::int64_t drop_transients(const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
                              const ViewChoiceOptions& options, std::vector<std::vector<FaceView>>& views) {
   std::vector<std::int64_t> dropped(views.size());
-  parallel_for_blocks(std::ssize(views), kGrain, options.threads,
-                      [&](std::int64_t begin, std::int64_t end, int) {
-                        for (std::int64_t f = begin; f < end; ++f)
-                          dropped[f] = drop_from(gains, canonical.empty() ? nullptr : &canonical[f],
-                                                 options.transient, views[f]);
-                      });
+  parallel_for_blocks(
+      std::ssize(views), kGrain, options.threads, [&](std::int64_t begin, std::int64_t end, int) {
+        for (std::int64_t f = begin; f < end; ++f)
+          dropped[f] =
+              drop_from(gains, canonical.empty() ? nullptr : &canonical[f], options.transient, views[f]);
+      });
   std::int64_t sum = 0;
   for (const std::int64_t count : dropped) sum += count;
   return sum;
 }
 
 std::vector<int> choose_views(const std::vector<std::array<std::int32_t, 3>>& neighbours,
-                              const std::vector<std::vector<FaceView>>& views, const ViewChoiceOptions& options) {
+                              const std::vector<std::vector<FaceView>>& views,
+                              const ViewChoiceOptions& options) {
   return Labelling(neighbours, views, options).solve();
 }
 

@@ -8,8 +8,8 @@
 namespace roxel {
 namespace {
 
-constexpr int kReach = 2;           ///< voxels
-constexpr double kNearness = 0.7;   ///< sigma of the weight by distance, voxels
+constexpr int kReach = 2;          ///< voxels
+constexpr double kNearness = 0.7;  ///< sigma of the weight by distance, voxels
 constexpr std::int64_t kGrain = 1024;
 
 class ColorOfPoint {
@@ -52,8 +52,9 @@ class ColorOfPoint {
 
 }  // namespace
 
-std::vector<std::array<float, 3>> volume_colors(const std::vector<Eigen::Vector3d>& points, const Volume& volume,
-                                                const ColorTransform& colors, int threads) {
+std::vector<std::array<float, 3>> volume_colors(const std::vector<Eigen::Vector3d>& points,
+                                                const Volume& volume, const ColorTransform& colors,
+                                                int threads) {
   const ColorOfPoint color(volume, colors);
   std::vector<std::array<float, 3>> out(points.size());
   parallel_for_blocks(std::ssize(points), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
