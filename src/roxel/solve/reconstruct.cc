@@ -178,7 +178,7 @@ Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
   summary.notes = dataset.notes;
   summary.notes.insert(summary.notes.end(), result.scene.notes.begin(), result.scene.notes.end());
   if (hooks.after_survey) hooks.after_survey(result.scene);
-  summary.stages.push_back({"survey", seconds_since(start)});
+  summary.stages.push_back({"survey", seconds_since(start), peak_memory_bytes()});
 
   LevelProgress progress(options, context, progress_share);
   for (int level = 1; level <= options.levels; ++level) {

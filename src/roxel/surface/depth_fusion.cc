@@ -22,6 +22,7 @@ constexpr std::int64_t kPixelsAtOnce = 16'000'000;  ///< of views that are in me
 constexpr float kLeastCosine = 0.2f;  ///< of the angle between ray and normal: steeper depth says no less
 constexpr float kUnknownCosine = 0.7f;
 constexpr float kSupport = 2.5f;        ///< steps from its surface within which a view supports one
+constexpr float kLeastSupportCosine = 0.5f;  ///< views that see a surface at a flatter angle support less of it
 constexpr double kFarthestOutline = 4;  ///< pixels
 constexpr std::size_t kBytesPerLeaf = 3 * (Leaf::SIZE * sizeof(float) + 128);
 
@@ -144,7 +145,7 @@ class Voting {
     const float distance = along * scale;
     if (distance >= band_ && beside_surface(view, uvz)) return {};
     return {std::min(distance, band_), *view.weight.pixel(px, py) * scale * behind(along),
-            std::abs(distance) < support_};
+            std::abs(along) * std::max(scale, kLeastSupportCosine) < support_};
   }
 
  private:
