@@ -21,8 +21,9 @@ using Leaf = openvdb::FloatTree::LeafNodeType;
 constexpr std::int64_t kPixelsAtOnce = 16'000'000;  ///< of views that are in memory together
 constexpr float kLeastCosine = 0.2f;  ///< of the angle between ray and normal: steeper depth says no less
 constexpr float kUnknownCosine = 0.7f;
-constexpr float kSupport = 2.5f;        ///< steps from its surface within which a view supports one
-constexpr float kLeastSupportCosine = 0.5f;  ///< views that see a surface at a flatter angle support less of it
+constexpr float kSupport = 2.5f;  ///< steps from its surface within which a view supports one
+constexpr float kLeastSupportCosine =
+    0.5f;                               ///< views that see a surface at a flatter angle support less of it
 constexpr double kFarthestOutline = 4;  ///< pixels
 constexpr std::size_t kBytesPerLeaf = 3 * (Leaf::SIZE * sizeof(float) + 128);
 
