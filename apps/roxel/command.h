@@ -108,6 +108,7 @@ void add_depth(Commands& commands);
 void add_render(Commands& commands);
 void add_eval(Commands& commands);
 void add_merge(Commands& commands);
+void add_mesh(Commands& commands);
 void add_synth(Commands& commands);
 void add_convert(Commands& commands);
 

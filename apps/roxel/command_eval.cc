@@ -75,7 +75,7 @@ OptionTable<MeasureSwitches> measure_table() {
   table.add("estimate", &MeasureSwitches::estimate)
       .help("Measure this mesh or point set, too")
       .placeholder("FILE.ply")
-      .unset("depth points and voxels of the run alone");
+      .unset("depth points, voxels and mesh.ply of the run alone");
   table.add("opacity-threshold", &MeasureSwitches::opacity_threshold)
       .help("Voxels of at least this opacity are measured")
       .range(0, 0.999)
@@ -190,8 +190,12 @@ std::vector<ReportView> report_views_of(const EvalSource& source) {
 }
 
 std::string report_page(const EvalSource& source, const RunMeasures& measures) {
-  ReportContent content{
-      nlohmann::ordered_json(source.run.summary), report_views_of(source), measures.sections, {}, &measures};
+  ReportContent content{nlohmann::ordered_json(source.run.summary),
+                        report_views_of(source),
+                        {},
+                        measures.sections,
+                        {},
+                        &measures};
   content.opacities = saved_voxels(source.run.file.volume, 0, 0).opacity;
   return html_report(content);
 }

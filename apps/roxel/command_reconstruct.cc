@@ -7,6 +7,7 @@
 #include "dense_workspace.h"
 #include "depth_files.h"
 #include "describe.h"
+#include "mesh_stage.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/content_hash.h"
 #include "roxel/base/error.h"
@@ -19,10 +20,10 @@
 namespace roxel::cli {
 namespace {
 
-constexpr double kVolumeShare = 0.55;  ///< of the bar; what is left is for depth and pictures
-constexpr double kVolumeWritten = 0.57;
-constexpr double kViewsWritten = 0.65;
-constexpr double kDepthRefined = 0.98;
+constexpr double kVolumeShare = 0.5;  ///< of the bar; what is left is for depth, pictures and surface
+constexpr double kVolumeWritten = 0.52;
+constexpr double kViewsWritten = 0.58;
+constexpr double kDepthRefined = 0.85;
 
 enum class Export { kNone, kColmap };
 
@@ -32,6 +33,7 @@ struct StageSwitches {
   bool dry_run = false;
   bool depth = true;
   bool render = true;
+  bool mesh = true;
   bool report = true;
   bool save_surround = false;
   Export exported = Export::kNone;
@@ -40,6 +42,7 @@ struct StageSwitches {
 struct RunOptions {
   ReconstructOptions reconstruct;
   DepthStageOptions depth;
+  MeshOptions mesh;
   InputOptions input;
   StageSwitches stages;
   CommonOptions common;
@@ -61,6 +64,8 @@ OptionTable<StageSwitches> stage_table() {
   table.add("depth", &StageSwitches::depth).help("Depth maps: depth/NAME.exr and .png");
   table.add("render", &StageSwitches::render)
       .help("Pictures of the input views: render/NAME.png and error/NAME.png");
+  table.add("mesh", &StageSwitches::mesh)
+      .help("The surface from the depth maps: mesh.ply, mesh.glb, mesh.obj; needs --depth");
   table.add("report", &StageSwitches::report).help("A page to look at: report.html");
   table.add("save-surround", &StageSwitches::save_surround)
       .help("Keep the voxels around the box in volume.vdb");
@@ -75,6 +80,7 @@ OptionTable<RunOptions> run_table() {
   table.include(stage_table(), &RunOptions::stages);
   table.include(reconstruct_option_table(), &RunOptions::reconstruct);
   table.include(depth_option_table(), &RunOptions::depth);
+  table.include(mesh_option_table(), &RunOptions::mesh);
   table.include(common_option_table(), &RunOptions::common);
   return table;
 }
@@ -187,7 +193,7 @@ class Run {
     if (skies.empty() && choice == IlluminationChoice::kSky) {
       const SkyInput input = read_sky_input(invocation_.inputs.front(), options_.input, {}, session_);
       skies_ = fit_skies(input, {}, results, session_, input_.dataset.warnings);
-      made_.summary.stages.push_back({"sky", stopwatch_.lap()});
+      add_stage("sky");
       skies = results;
     }
     if (skies.empty()) return;
@@ -220,6 +226,7 @@ class Run {
     refine_depth(results);
     export_depth(results);
     session_.context().throw_if_cancelled();
+    if (options_.stages.depth && options_.stages.mesh) write_mesh(results);
     if (options_.stages.report) write_report(results);
     const std::string json = write_summary(results);
     if (partial_) partial_->publish([&] { remove_results(folder); });
@@ -228,18 +235,14 @@ class Run {
 
   void write_volume_files(const std::filesystem::path& results) {
     report("writing", kVolumeShare);
-    VolumeInfo info;
-    info.colors = made_.scene.transform;
-    info.exposure = made_.scene.exposure;
-    info.dataset = input_.dataset.path;
-    write_volume(results / "volume.vdb", made_.volume, info,
+    write_volume(results / "volume.vdb", made_.volume, volume_info(),
                  options_.stages.save_surround ? SavedLattices::kAll : SavedLattices::kBoxOnly);
     session_.context().throw_if_cancelled();
     write_voxels_ply(results / "voxels.ply", made_.volume, made_.scene.transform,
                      static_cast<float>(options_.reconstruct.opacity_threshold),
                      static_cast<float>(options_.reconstruct.confidence_threshold));
     session_.context().throw_if_cancelled();
-    made_.summary.stages.push_back({"write volume", stopwatch_.lap(), peak_memory_bytes()});
+    add_stage("write volume");
     report("writing", kVolumeWritten);
   }
 
@@ -257,8 +260,7 @@ class Run {
     views_ = writer.figures();
     report_views_ = writer.report_pictures();
     reprojection_rms_ = writer.reprojection_rms();
-    if (stages.depth || stages.render)
-      made_.summary.stages.push_back({"depth and pictures", stopwatch_.lap(), peak_memory_bytes()});
+    if (stages.depth || stages.render) add_stage("depth and pictures");
   }
 
   /// Belief propagation and refinement of what write_views has written.
@@ -276,7 +278,35 @@ class Run {
     if (!options_.stages.depth || options_.stages.exported == Export::kNone) return;
     write_dense_workspace(input_.dataset, input_.load, results, results / "colmap", made_.scene.exposure,
                           made_.scene.voxel_size, session_.context());
-    made_.summary.stages.push_back({"export", stopwatch_.lap(), peak_memory_bytes()});
+    add_stage("export");
+  }
+
+  void add_stage(const char* name) {
+    made_.summary.stages.push_back({name, stopwatch_.lap(), peak_memory_bytes()});
+  }
+
+  VolumeInfo volume_info() const {
+    VolumeInfo info;
+    info.colors = made_.scene.transform;
+    info.exposure = made_.scene.exposure;
+    info.dataset = input_.dataset.path;
+    return info;
+  }
+
+  /// Where there is no surface to make, a run still has its volume and depth: said, not failed.
+  void write_mesh(const std::filesystem::path& results) {
+    const MeshInput source{input_.dataset,         input_.load, made_.volume,  volume_info(),
+                           made_.scene.bounds.box, results,     kDepthRefined, 0.98};
+    try {
+      MeshResult mesh = make_mesh(source, options_.mesh, results, session_.context());
+      mesh_figures_ = std::move(mesh.figures);
+      report_mesh_ = std::move(mesh.pictures);
+      for (const std::string& warning : mesh.warnings) warn(options_.common, warning);
+    } catch (const InvalidInput& error) {
+      made_.summary.notes.push_back(std::string("no mesh: ") + error.what());
+      warn(options_.common, made_.summary.notes.back());
+    }
+    add_stage("mesh");
   }
 
   nlohmann::ordered_json summary_so_far() {
@@ -288,13 +318,13 @@ class Run {
   }
 
   void write_report(const std::filesystem::path& results) {
-    ReportContent content{summary_so_far(), std::move(report_views_), {}, {}};
+    ReportContent content{summary_so_far(), std::move(report_views_), std::move(report_mesh_), {}, {}};
     const Eigen::Vector3d middle = made_.scene.bounds.box.center();
     for (int axis = 0; axis < 3; ++axis)
       content.sections.push_back(opacity_section(made_.volume, axis, middle[axis]));
     content.opacities = saved_voxels(made_.volume, 0, 0).opacity;
     write_text_atomically(results / "report.html", html_report(content));
-    made_.summary.stages.push_back({"report", stopwatch_.lap(), peak_memory_bytes()});
+    add_stage("report");
   }
 
   std::string write_summary(const std::filesystem::path& results) {
@@ -327,6 +357,7 @@ class Run {
     record.warnings.insert(record.warnings.end(), made_.scene.warnings.begin(), made_.scene.warnings.end());
     record.views = views_;
     record.reprojection_rms = reprojection_rms_;
+    record.mesh = mesh_figures_;
     for (std::size_t v = 0; v < hashes_.size(); ++v) {
       record.views[v].hash = hashes_[v];
       add_to_hash(input_.dataset.views[v], hashes_[v], record.dataset_hash);
@@ -365,6 +396,8 @@ class Run {
   std::vector<ViewFigures> views_;
   std::vector<ReportView> report_views_;
   std::optional<DepthStageFigures> refined_;
+  nlohmann::ordered_json mesh_figures_;
+  ReportMesh report_mesh_;
   std::optional<double> reprojection_rms_;
 };
 
@@ -379,8 +412,8 @@ void add_reconstruct(Commands& commands) {
                    "DATASET", "RUN"};
   form.output_required = false;  // a dry run writes nothing
   form.details =
-      "What is in RUN afterwards: summary.json, volume.vdb, voxels.ply, overview.png, report.html, and for "
-      "every image\n"
+      "What is in RUN afterwards: summary.json, volume.vdb, voxels.ply, overview.png, report.html, "
+      "mesh.ply, mesh.glb,\nmesh.obj, mesh_views.png, mesh_turntable.jpg, and for every image\n"
       "depth/NAME.exr (and .png), render/NAME.png, error/NAME.png.\n";
   add_command(commands, form, run_table(), run_reconstruct);
 }

@@ -276,7 +276,8 @@ class Measurement {
     saved_ =
         saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold), kConfident);
     add_points("voxels", saved_.centres);
-    if (source_.estimate) add_estimate(*source_.estimate);
+    if (source_.run_mesh) add_mesh("mesh", *source_.run_mesh);
+    if (source_.estimate) add_mesh(source_.estimate_name, *source_.estimate);
   }
 
   void add_points(const std::string& name, std::vector<Eigen::Vector3d> points) {
@@ -285,10 +286,9 @@ class Measurement {
     add_surface(name, inside, Mesh{std::move(points), {}});
   }
 
-  void add_estimate(const Mesh& mesh) {
-    if (mesh.is_point_set()) return add_points(source_.estimate_name, mesh.points);
-    add_surface(source_.estimate_name, sample_surface(mesh, {options_.samples, options_.seed, source_.box}),
-                mesh);
+  void add_mesh(const std::string& name, const Mesh& mesh) {
+    if (mesh.is_point_set()) return add_points(name, mesh.points);
+    add_surface(name, sample_surface(mesh, {options_.samples, options_.seed, source_.box}), mesh);
   }
 
   void add_surface(const std::string& name, const std::vector<Eigen::Vector3d>& points, Mesh mesh) {

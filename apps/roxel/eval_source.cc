@@ -3,6 +3,7 @@
 #include "roxel/base/error.h"
 #include "roxel/io/ply_file.h"
 #include "roxel/io/sky_truth.h"
+#include "run_input.h"
 
 namespace roxel::cli {
 namespace {
@@ -14,19 +15,6 @@ std::vector<std::string> names_of_views(const FinishedRun& run) {
   for (const auto& view : run.summary.value("views", nlohmann::json::array()))
     names.push_back(view.value("name", ""));
   return names;
-}
-
-/// The bounds of the summary, or the box of the lattice where it has none.
-Eigen::AlignedBox3d box_of(const FinishedRun& run) {
-  const nlohmann::json bounds =
-      run.summary.value("scene", nlohmann::json::object()).value("bounds", nlohmann::json());
-  if (bounds.is_null()) return run.file.volume.index(0).frame().box();
-  const auto v = bounds.get<std::vector<double>>();
-  const bool fits = v.size() == 6 && v[0] < v[3] && v[1] < v[4] && v[2] < v[5];
-  if (!fits)
-    throw_invalid((run.path / "summary.json").string() + ": scene.bounds", bounds.dump(),
-                  "six numbers, the first corner below the second");
-  return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
 }
 
 void read_dataset_of_run(const EvalPaths& paths, const Session& session, EvalSource& source) {
@@ -64,6 +52,8 @@ std::optional<fs::path> truth_folder(const EvalPaths& paths, const EvalSource& s
 void read_surfaces(const EvalPaths& paths, EvalSource& source) {
   if (source.truth && fs::is_regular_file(*source.truth / "mesh.ply"))
     source.surface = read_ply(*source.truth / "mesh.ply");
+  if (source.surface && fs::is_regular_file(source.run.path / "mesh.ply"))
+    source.run_mesh = read_ply(source.run.path / "mesh.ply");
   if (!paths.estimate) return;
   if (!source.surface)
     throw_invalid("--estimate " + *paths.estimate, "no true surface to measure it by",

@@ -26,6 +26,7 @@ struct EvalSource {
   std::map<std::string, const View*> views;  ///< of it, by name
   std::optional<std::filesystem::path> truth;
   std::optional<Mesh> surface;   ///< truth/mesh.ply
+  std::optional<Mesh> run_mesh;  ///< RUN/mesh.ply, where there is a surface to measure it by
   std::optional<Mesh> estimate;  ///< to measure besides the run
   std::string estimate_name;
   std::optional<Input> held_out;  ///< views of transforms_test.json

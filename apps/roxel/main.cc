@@ -20,6 +20,7 @@ Commands make_commands() {
   add_reconstruct(commands);
   add_sky(commands);
   add_depth(commands);
+  add_mesh(commands);
   add_render(commands);
   add_eval(commands);
   add_merge(commands);

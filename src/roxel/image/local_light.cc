@@ -10,9 +10,9 @@ namespace roxel {
 
 namespace {
 
-constexpr int kPlanes = 4;         ///< log R, log G, log B, each times the weight; the weight
-constexpr int kBoxes = 3;          ///< three running means are within 3 % of a Gaussian everywhere
-constexpr float kFaintest = 1e-4f; ///< weight of the mean of all pixels: it decides only where no other does
+constexpr int kPlanes = 4;          ///< log R, log G, log B, each times the weight; the weight
+constexpr int kBoxes = 3;           ///< three running means are within 3 % of a Gaussian everywhere
+constexpr float kFaintest = 1e-4f;  ///< weight of the mean of all pixels: it decides only where no other does
 
 /// Half width of the box whose kBoxes-fold running mean has this standard deviation.
 int box_radius(double sigma_px) {
@@ -44,8 +44,10 @@ void blur(Image& planes, double sigma_px) {
   const std::ptrdiff_t row = std::ptrdiff_t{kPlanes} * planes.width();
   std::vector<std::array<float, kPlanes>> copy;
   for (int box = 0; box < kBoxes; ++box) {
-    for (int y = 0; y < planes.height(); ++y) blur_line(planes.pixel(0, y), planes.width(), kPlanes, radius, copy);
-    for (int x = 0; x < planes.width(); ++x) blur_line(planes.pixel(x, 0), planes.height(), row, radius, copy);
+    for (int y = 0; y < planes.height(); ++y)
+      blur_line(planes.pixel(0, y), planes.width(), kPlanes, radius, copy);
+    for (int x = 0; x < planes.width(); ++x)
+      blur_line(planes.pixel(x, 0), planes.height(), row, radius, copy);
   }
 }
 

@@ -73,9 +73,9 @@ TEST(WithoutLocalLight, ShadowsGoBeyondTheBlur) {
   for (int y = 0; y < 24; ++y)
     for (int x = 0; x < 60; ++x)
       for (int c = 0; c < 3; ++c) shaded.pixel(x, y)[c] *= 0.2f;
-  const Image lit = without_local_light(image, {}, {}, exact(5)), out = without_local_light(shaded, {}, {}, exact(5));
-  for (const int x : {10, 30, 90, 110})
-    EXPECT_NEAR(out.pixel(x, 12)[0] / lit.pixel(x, 12)[0], 1, 0.01) << x;
+  const Image lit = without_local_light(image, {}, {}, exact(5)),
+              out = without_local_light(shaded, {}, {}, exact(5));
+  for (const int x : {10, 30, 90, 110}) EXPECT_NEAR(out.pixel(x, 12)[0] / lit.pixel(x, 12)[0], 1, 0.01) << x;
   EXPECT_LT(out.pixel(58, 12)[0] / lit.pixel(58, 12)[0], 0.7);
 }
 

@@ -49,6 +49,8 @@ figcaption { font-size: .85rem; color: #444; }
 .view img { width: 100%; height: auto; display: block; background: #ddd; }
 .settings { columns: 22rem; font-size: .85rem; font-family: ui-monospace, monospace; }
 .settings div { break-inside: avoid; overflow-wrap: anywhere; }
+.turntable { width: 240px; height: 480px; max-width: 100%; background-repeat: no-repeat; }
+@keyframes turn { to { background-position-x: var(--end); } }
 footer { margin-top: 2rem; font-size: .85rem; color: #555; border-top: 1px solid #ccc; padding-top: .4rem; }
 @media (max-width: 40rem) {
   body { padding: .6rem; }
@@ -141,6 +143,7 @@ class Page {
     measures();
     views();
     skies();
+    mesh();
     sections();
     convergence();
     cost();
@@ -383,6 +386,42 @@ class Page {
                       text_of(at(sky, "fallback"))});
     if (rows.size() > 1) out_ += table(rows);
     picture_rows(content_.skies);
+  }
+
+  void mesh() {
+    if (content_.mesh.views.empty()) return;
+    heading("Surface");
+    const ordered_json& mesh = at(summary_, "mesh");
+    std::vector<std::vector<std::string>> rows;
+    const auto row = [&](const char* name, const std::string& value) {
+      if (!value.empty()) rows.push_back({name, value});
+    };
+    row("triangles", text_of(at(mesh, "triangles")));
+    row("points", text_of(at(mesh, "points")));
+    row("step of the lattice", text_of(at(mesh, "voxel_size")));
+    row("triangles that close holes", text_of(at(mesh, "closing_triangles")));
+    const ordered_json& texture = at(mesh, "texture");
+    if (texture.is_object()) {
+      row("texture", text_of(at(texture, "width")) + " x " + text_of(at(texture, "height")));
+      row("charts", text_of(at(texture, "charts")));
+      row("triangles that no photograph shows whole", text_of(at(texture, "unseen_triangles")));
+      row("difference across seams (RMS)", percent(number(texture, "seam_rms_before"), 2) + ", levelled " +
+                                               percent(number(texture, "seam_rms"), 2));
+    }
+    out_ += table(rows, "text");
+    turntable();
+    picture_rows(content_.mesh.views);
+  }
+
+  /// A strip of pictures behind a window that moves on by one picture at a time, without scripts.
+  void turntable() {
+    const ReportMesh& mesh = content_.mesh;
+    if (mesh.turntable.empty() || mesh.turns < 1) return;
+    out_ += formatted(
+                "<div class=\"turntable\" role=\"img\" aria-label=\"the surface from all around\" "
+                "style=\"--end: -%dpx; animation: turn 6s steps(%d) infinite; background-image: url(",
+                240 * mesh.turns, mesh.turns) +
+            data_uri("image/jpeg", mesh.turntable) + ")\"></div>\n";
   }
 
   void sections() {

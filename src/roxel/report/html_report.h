@@ -21,9 +21,18 @@ struct ReportView {
   std::vector<ReportPicture> pictures = {};
 };
 
+/// The surface: shaded and textured views, and a strip of square pictures from all around, shaded above
+/// coloured.
+struct ReportMesh {
+  std::vector<ReportView> views = {};
+  std::string turntable = {};  ///< bytes of a JPEG; empty: none
+  int turns = 0;               ///< pictures side by side in it
+};
+
 struct ReportContent {
   nlohmann::ordered_json summary;      ///< of the run, as docs/format.md has it
   std::vector<ReportView> views = {};  ///< those that are shown
+  ReportMesh mesh = {};                ///< no views: there is no mesh
   std::vector<Section> sections = {};
   std::vector<float> opacities = {};      ///< of the box's voxels
   const RunMeasures* measures = nullptr;  ///< against the truth; null: not measured

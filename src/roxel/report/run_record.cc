@@ -138,33 +138,34 @@ ordered_json list(const std::vector<T>& items, ToJson to) {
 ordered_json to_json(const RunRecord& record) {
   const Summary& summary = record.summary;
   ordered_json json{{"format", kSummaryFormat},
-          {"version", ROXEL_VERSION},
-          {"command", record.command_line},
-          {"dataset",
-           {{"path", record.dataset_path},
-            {"format", record.dataset_format},
-            {"images", record.views.size()},
-            {"nodes", record.nodes},
-            {"hash", record.dataset_hash}}},
-          {"options", record.options},
-          {"scene", scene_json(record)},
-          {"termination", summary.termination},
-          {"reprojection_rms_percent", or_null(record.reprojection_rms)},
-          {"levels", list(summary.levels, level_json)},
-          {"passes", list(summary.passes, pass_json)},
-          {"light", list(summary.light, light_json)},
-          {"stages", list(summary.stages,
-                          [](const StageRecord& s) {
-                            return ordered_json{{"name", s.name},
-                                                {"seconds", s.seconds},
-                                                {"peak_memory_bytes", s.peak_memory_bytes}};
-                          })},
-          {"seconds", summary.seconds},
-          {"threads", record.threads},
-          {"peak_memory_bytes", summary.peak_memory_bytes},
-          {"notes", summary.notes},
-          {"warnings", record.warnings},
-          {"views", views_json(record)}};
+                    {"version", ROXEL_VERSION},
+                    {"command", record.command_line},
+                    {"dataset",
+                     {{"path", record.dataset_path},
+                      {"format", record.dataset_format},
+                      {"images", record.views.size()},
+                      {"nodes", record.nodes},
+                      {"hash", record.dataset_hash}}},
+                    {"options", record.options},
+                    {"scene", scene_json(record)},
+                    {"termination", summary.termination},
+                    {"reprojection_rms_percent", or_null(record.reprojection_rms)},
+                    {"levels", list(summary.levels, level_json)},
+                    {"passes", list(summary.passes, pass_json)},
+                    {"light", list(summary.light, light_json)},
+                    {"stages", list(summary.stages,
+                                    [](const StageRecord& s) {
+                                      return ordered_json{{"name", s.name},
+                                                          {"seconds", s.seconds},
+                                                          {"peak_memory_bytes", s.peak_memory_bytes}};
+                                    })},
+                    {"mesh", record.mesh},
+                    {"seconds", summary.seconds},
+                    {"threads", record.threads},
+                    {"peak_memory_bytes", summary.peak_memory_bytes},
+                    {"notes", summary.notes},
+                    {"warnings", record.warnings},
+                    {"views", views_json(record)}};
   if (!record.skies.empty()) json["skies"] = record.skies;
   return json;
 }
@@ -226,7 +227,8 @@ Light light_of_run(const FinishedRun& run, const Dataset& dataset) {
     if (light.from == LightSource::kNone) return light;
     std::map<std::string, std::array<float, 3>> of_names;
     for (const json& view : run.summary.value("views", json::array()))
-      if (view.contains("light")) of_names[view.value("name", "")] = view["light"].get<std::array<float, 3>>();
+      if (view.contains("light"))
+        of_names[view.value("name", "")] = view["light"].get<std::array<float, 3>>();
     for (const View& view : dataset.views) {
       const auto named = of_names.find(view.name);
       light.of_views.push_back(named == of_names.end() ? std::array<float, 3>{1, 1, 1} : named->second);
@@ -249,7 +251,9 @@ void remove_results(const fs::path& run) {
   }
   std::error_code ignored;
   fs::remove(run / "summary.json", ignored);
-  for (const char* name : {"volume.vdb", "voxels.ply", "overview.png", "report.html"})
+  for (const char* name :
+       {"volume.vdb", "voxels.ply", "overview.png", "report.html", "mesh.ply", "mesh.glb", "mesh.obj",
+        "mesh.mtl", "mesh.png", "mesh.jpg", "mesh_views.png", "mesh_turntable.jpg"})
     fs::remove(run / name, ignored);
   if (!fs::is_symlink(run / "sky")) fs::remove_all(run / "sky", ignored);
   try {

@@ -43,6 +43,7 @@ struct RunRecord {
   std::vector<nlohmann::ordered_json> skies;  ///< as roxel sky reports them, where they were fitted
   std::vector<ViewFigures> views;
   std::optional<double> reprojection_rms;  ///< percent, over all views together
+  nlohmann::ordered_json mesh;             ///< what was made of the surface; null: none
 };
 
 nlohmann::ordered_json to_json(const RunRecord& record);

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "roxel/base/error.h"
+#include "roxel/sky/sky_picture.h"
 #include "roxel/solve/cube_fixture.h"
 #include "roxel/solve/scene.h"
-#include "roxel/sky/sky_picture.h"
 
 namespace roxel {
 namespace {

@@ -12,12 +12,12 @@ namespace roxel {
 
 namespace {
 
-constexpr int kSide = 96;               ///< pixels along the longer side at which views are compared
-constexpr float kCovered = 0.7f;        ///< opacity of a pixel that shows the volume
-constexpr float kDarkest = 0.01f;       ///< canonical; below, noise and black level decide the ratio
-constexpr float kBrightest = 0.98f;     ///< of a display image's full scale: clipped
+constexpr int kSide = 96;            ///< pixels along the longer side at which views are compared
+constexpr float kCovered = 0.7f;     ///< opacity of a pixel that shows the volume
+constexpr float kDarkest = 0.01f;    ///< canonical; below, noise and black level decide the ratio
+constexpr float kBrightest = 0.98f;  ///< of a display image's full scale: clipped
 constexpr std::size_t kFewestPixels = 32;
-constexpr double kHuber = 1.345;        ///< standard deviations: 95 % efficiency on Gaussian errors
+constexpr double kHuber = 1.345;  ///< standard deviations: 95 % efficiency on Gaussian errors
 
 /// Robust mean: Huber's, by reweighting, with the median absolute deviation as scale.
 double huber_mean(std::vector<double> values) {
@@ -51,7 +51,8 @@ PinholeCamera shrunk(const PinholeCamera& camera, int factor) {
 }
 
 /// Mean of the block's pixels, per channel; false where one of them is unusable, background or clipped.
-bool block_mean(const Photograph& photo, float clipped, int factor, int x, int y, std::array<double, 3>& mean) {
+bool block_mean(const Photograph& photo, float clipped, int factor, int x, int y,
+                std::array<double, 3>& mean) {
   mean = {0, 0, 0};
   for (int v = y * factor; v < (y + 1) * factor; ++v)
     for (int u = x * factor; u < (x + 1) * factor; ++u) {
@@ -108,8 +109,7 @@ std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Ren
 GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
                   const Scene& scene, const RunContext& context) {
   const LatticeStack stack(volume);
-  const std::vector<std::array<float, 3>> colors =
-      radiance_colors(volume, scene.transform, scene.exposure);
+  const std::vector<std::array<float, 3>> colors = radiance_colors(volume, scene.transform, scene.exposure);
   const int views = static_cast<int>(dataset.views.size());
   std::vector<std::array<double, 3>> logs(views);
   std::vector<char> fitted(views, 0);
@@ -132,8 +132,7 @@ GainFit fit_gains(const Volume& volume, const Dataset& dataset, const Photograph
     for (int c = 0; c < 3; ++c) {
       const double gain = std::exp(logs[v][c] - mean[c]);
       fit.of_views[v][c] = static_cast<float>(gain);
-      fit.largest_change =
-          std::max(fit.largest_change, std::abs(gain / scene.light.of_view(v)[c] - 1));
+      fit.largest_change = std::max(fit.largest_change, std::abs(gain / scene.light.of_view(v)[c] - 1));
     }
   return fit;
 }

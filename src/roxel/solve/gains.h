@@ -12,8 +12,8 @@ namespace roxel {
 
 struct GainFit {
   std::vector<std::array<float, 3>> of_views;  ///< geometric mean over the views 1 in every channel
-  int fitted_views = 0;      ///< the others show too little of the volume, and keep what they had
-  double largest_change = 0; ///< of any view and channel, as a ratio less 1
+  int fitted_views = 0;       ///< the others show too little of the volume, and keep what they had
+  double largest_change = 0;  ///< of any view and channel, as a ratio less 1
 };
 
 /// What lies between a photograph and how the volume renders it: per channel the robust (Huber) mean of

@@ -23,8 +23,8 @@ enum class LightSource {
 struct Light {
   std::vector<std::array<float, 3>> of_views;  ///< one a view; empty: 1 for all
   LightSource from = LightSource::kNone;
-  bool local_matching = false;                 ///< colours are compared without their neighbourhood's light
-  double blur_deg = 5;                         ///< standard deviation of that neighbourhood
+  bool local_matching = false;  ///< colours are compared without their neighbourhood's light
+  double blur_deg = 5;          ///< standard deviation of that neighbourhood
 
   std::array<float, 3> of_view(int view_idx) const {
     return of_views.empty() ? std::array<float, 3>{1, 1, 1} : of_views[view_idx];

@@ -43,7 +43,7 @@ struct LevelRecord {
 struct StageRecord {
   std::string name;
   double seconds = 0;
-  std::int64_t peak_memory_bytes = 0;  ///< of the process, up to the end of the stage
+  std::int64_t peak_memory_bytes = 0;  ///< of the process up to its end; 0: not known
 };
 
 struct Summary {

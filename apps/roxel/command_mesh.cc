@@ -1,0 +1,100 @@
+/// roxel mesh: the surface of a finished run, from its depth maps.
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "command.h"
+#include "mesh_stage.h"
+#include "roxel/base/atomic_file.h"
+#include "roxel/base/error.h"
+#include "run_input.h"
+
+namespace roxel::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SourceOptions {
+  std::optional<std::string> dataset;
+};
+
+struct MeshCommandOptions {
+  SourceOptions source;
+  MeshOptions mesh;
+  CommonOptions common;
+};
+
+OptionTable<SourceOptions> source_table() {
+  OptionTable<SourceOptions> table;
+  table.group("Photographs of the run");
+  table.add("dataset", &SourceOptions::dataset)
+      .help("Where the run's photographs and cameras are now")
+      .placeholder("DATASET")
+      .unset("where the run has read them");
+  return table;
+}
+
+OptionTable<MeshCommandOptions> mesh_table() {
+  OptionTable<MeshCommandOptions> table;
+  table.include(source_table(), &MeshCommandOptions::source);
+  table.include(mesh_option_table(), &MeshCommandOptions::mesh);
+  table.include(common_option_table(), &MeshCommandOptions::common);
+  return table;
+}
+
+Input read_photographs(const FinishedRun& run, const MeshCommandOptions& options, const Session& session) {
+  const std::string path = options.source.dataset.value_or(run.file.info.dataset);
+  if (path.empty() || !fs::exists(path))
+    throw_invalid(run.path.string(), "a run whose data set \"" + path + "\" is not there",
+                  "--dataset DATASET");
+  return read_input(path, input_options_of(run), session);
+}
+
+/// The run's summary tells of its newest mesh.
+void write_figures(const FinishedRun& run, const fs::path& folder, bool own_folder,
+                   const nlohmann::ordered_json& figures) {
+  if (!own_folder) return write_text_atomically(folder / "mesh.json", json_text(figures) + "\n");
+  std::ifstream in(run.path / "summary.json");
+  nlohmann::ordered_json summary = nlohmann::ordered_json::parse(in);
+  summary["mesh"] = figures;
+  write_text_atomically(folder / "summary.json", json_text(summary) + "\n");
+}
+
+int run_mesh(const Invocation& invocation, const MeshCommandOptions& options) {
+  Session session(options.common);
+  const FinishedRun run = read_run(invocation.inputs.front());
+  const Input input = read_photographs(run, options, session);
+  const bool own_folder = invocation.output.empty();
+  const fs::path target = own_folder ? run.path : invocation.output;
+  if (!own_folder) protect_sources(target, {{run.path}, &input.dataset});
+  const OutputFolder folder(target);
+  PartialResults partial(folder.path());
+  const MeshInput source{input.dataset, input.load, run.file.volume, run.file.info, box_of(run), run.path};
+  MeshResult result = make_mesh(source, options.mesh, partial.path(), session.context());
+  result.figures["options"] = mesh_option_table().to_json(options.mesh);
+  write_figures(run, partial.path(), own_folder, result.figures);
+  partial.publish([&] {
+    std::error_code ignored;
+    for (const std::string& name : mesh_files()) fs::remove(target / name, ignored);
+  });
+  for (const std::string& warning : result.warnings) warn(options.common, warning);
+  session.display().clear();
+  print_result(options.common, result.text + "written to " + target.string() + "\n",
+               json_text(result.figures));
+  return 0;
+}
+
+}  // namespace
+
+void add_mesh(Commands& commands) {
+  CommandForm form{"mesh", "Make a run's surface from its depth maps: vertex colours and texture", "RUN",
+                   "DIR"};
+  form.output_required = false;
+  form.details =
+      "Writes mesh.ply (vertex colours), mesh.glb and mesh.obj (textured), mesh_views.png and "
+      "mesh_turntable.jpg to\n"
+      "RUN, and what it did to \"mesh\" in RUN/summary.json; or all to DIR, and mesh.json, with -o.\n";
+  add_command(commands, form, mesh_table(), run_mesh);
+}
+
+}  // namespace roxel::cli

@@ -1,0 +1,32 @@
+#include "run_input.h"
+
+#include "roxel/base/error.h"
+
+namespace roxel::cli {
+
+Eigen::AlignedBox3d box_of(const FinishedRun& run) {
+  const nlohmann::json bounds =
+      run.summary.value("scene", nlohmann::json::object()).value("bounds", nlohmann::json());
+  if (bounds.is_null()) return run.file.volume.index(0).frame().box();
+  const auto v = bounds.get<std::vector<double>>();
+  const bool fits = v.size() == 6 && v[0] < v[3] && v[1] < v[4] && v[2] < v[5];
+  if (!fits)
+    throw_invalid((run.path / "summary.json").string() + ": scene.bounds", bounds.dump(),
+                  "six numbers, the first corner below the second");
+  return {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
+}
+
+InputOptions input_options_of(const FinishedRun& run) {
+  InputOptions options;
+  const auto text = [&](const char* name, auto& target) {
+    if (const nlohmann::json& value = run.option(name); value.is_string()) target = value.get<std::string>();
+  };
+  text("format", options.format);
+  text("images", options.images);
+  text("nodes", options.nodes);
+  text("masks", options.masks);
+  text("response", options.response);
+  return options;
+}
+
+}  // namespace roxel::cli

@@ -1,0 +1,16 @@
+#pragma once
+/// The photographs of a finished run, read as the run has read them.
+
+#include "common.h"
+#include "roxel/report/run_record.h"
+
+namespace roxel::cli {
+
+/// Input options as the run used them.
+InputOptions input_options_of(const FinishedRun& run);
+
+/// The bounds of the summary, or the box of the lattice where it has none. Throws InvalidInput where they are
+/// damaged.
+Eigen::AlignedBox3d box_of(const FinishedRun& run);
+
+}  // namespace roxel::cli

@@ -1,0 +1,352 @@
+#include "roxel/surface/depth_fusion.h"
+
+#include <openvdb/tools/Morphology.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "roxel/base/error.h"
+#include "roxel/base/parallel.h"
+#include "roxel/surface/distance_voxels.inl"
+
+namespace roxel {
+namespace {
+
+using Eigen::Vector3d;
+using openvdb::Coord;
+using MaskTree = openvdb::MaskTree;
+using Leaf = openvdb::FloatTree::LeafNodeType;
+
+constexpr std::int64_t kPixelsAtOnce = 16'000'000;  ///< of views that are in memory together
+constexpr float kLeastCosine = 0.2f;  ///< of the angle between ray and normal: steeper depth says no less
+constexpr float kUnknownCosine = 0.7f;
+constexpr float kSupport = 2.5f;  ///< steps from its surface within which a view supports one
+constexpr float kLeastSupportCosine =
+    0.5f;                               ///< views that see a surface at a flatter angle support less of it
+constexpr double kFarthestOutline = 4;  ///< pixels
+constexpr std::size_t kBytesPerLeaf = 3 * (Leaf::SIZE * sizeof(float) + 128);
+
+/// A view ready to be asked: per pixel distance along the axis, weight, and the cosine that turns a distance
+/// along the axis into one along the normal.
+struct PreparedView {
+  PinholeCamera camera;
+  Image depth, weight, scale, opacity;
+  float continuous = 0;  ///< neighbours whose depths differ by less lie on one surface
+
+  bool has(int x, int y) const {
+    return x >= 0 && y >= 0 && x < depth.width() && y < depth.height() && *depth.pixel(x, y) > 0;
+  }
+};
+
+Vector3d pixel_point(const PreparedView& view, int x, int y) {
+  const Ray ray = view.camera.ray(x + 0.5, y + 0.5);
+  return ray.origin + *view.depth.pixel(x, y) * ray.direction;
+}
+
+/// Of the surface through the pixel's neighbours, two pixels away so that noise weighs less; zero where there
+/// are none on both sides.
+Vector3d normal_from_depth(const PreparedView& view, int x, int y) {
+  constexpr int kStep = 2;
+  const auto joined = [&](int ax, int ay) {
+    return view.has(ax, ay) &&
+           std::abs(*view.depth.pixel(ax, ay) - *view.depth.pixel(x, y)) < view.continuous;
+  };
+  if (!joined(x - kStep, y) || !joined(x + kStep, y) || !joined(x, y - kStep) || !joined(x, y + kStep))
+    return Vector3d::Zero();
+  const Vector3d across = pixel_point(view, x + kStep, y) - pixel_point(view, x - kStep, y);
+  const Vector3d down = pixel_point(view, x, y + kStep) - pixel_point(view, x, y - kStep);
+  return across.cross(down).normalized();
+}
+
+float axis_to_normal(const PreparedView& view, const Image& normals, int x, int y) {
+  const Ray ray = view.camera.ray(x + 0.5, y + 0.5);
+  Vector3d normal = Vector3d::Zero();
+  if (!normals.empty()) {
+    const float* n = normals.pixel(x, y);
+    normal = Vector3d(n[0], n[1], n[2]);
+  }
+  if (!(normal.squaredNorm() > 0.25)) normal = normal_from_depth(view, x, y);
+  if (!(normal.squaredNorm() > 0.25)) return kUnknownCosine;
+  // |direction| is what one unit along the axis is along the ray.
+  return std::max(kLeastCosine, static_cast<float>(std::abs(normal.dot(ray.direction))));
+}
+
+bool is_depth(float z, float variance) {
+  return z > 0 && std::isfinite(z) && variance >= 0 && std::isfinite(variance);
+}
+
+PreparedView prepare(FusionView view, const FusionOptions& options) {
+  const int width = view.depth.width(), height = view.depth.height();
+  ROXEL_CHECK_EQ(width, view.camera.intrinsics.width);
+  ROXEL_CHECK_EQ(height, view.camera.intrinsics.height);
+  ROXEL_CHECK_EQ(view.variance.data().size(), view.depth.data().size());
+  PreparedView out{view.camera,
+                   std::move(view.depth),
+                   Image(width, height, 1),
+                   Image(width, height, 1),
+                   std::move(view.opacity),
+                   static_cast<float>(options.band * options.voxel_size)};
+  const float least = static_cast<float>(options.least_sigma * options.voxel_size);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      float& z = *out.depth.pixel(x, y);
+      if (!is_depth(z, *view.variance.pixel(x, y))) z = 0;
+    }
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      if (!out.has(x, y)) continue;
+      const float scale = axis_to_normal(out, view.normal, x, y);
+      *out.scale.pixel(x, y) = scale;
+      *out.weight.pixel(x, y) = 1 / (scale * scale * *view.variance.pixel(x, y) + least * least);
+    }
+  return out;
+}
+
+/// What a view says of one place.
+struct Vote {
+  float distance = 0;  ///< in front of its surface, world units, at most the band
+  float weight = 0;    ///< 0: it says nothing
+  bool near = false;   ///< its surface is close by
+};
+
+/// Depth between the four pixels around (u, v), or of the nearest one where they are not on one surface.
+float depth_at(const PreparedView& view, double u, double v) {
+  const float nearest = *view.depth.pixel(static_cast<int>(u), static_cast<int>(v));
+  const int x = static_cast<int>(std::floor(u - 0.5)), y = static_cast<int>(std::floor(v - 0.5));
+  if (!view.has(x, y) || !view.has(x + 1, y) || !view.has(x, y + 1) || !view.has(x + 1, y + 1))
+    return nearest;
+  const float a = *view.depth.pixel(x, y), b = *view.depth.pixel(x + 1, y), c = *view.depth.pixel(x, y + 1),
+              d = *view.depth.pixel(x + 1, y + 1);
+  const auto [low, high] = std::minmax({a, b, c, d});
+  if (high - low > view.continuous) return nearest;
+  const float s = static_cast<float>(u - 0.5 - x), t = static_cast<float>(v - 0.5 - y);
+  return (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d);
+}
+
+class Voting {
+ public:
+  explicit Voting(const FusionOptions& options)
+      : band_(static_cast<float>(options.band * options.voxel_size)),
+        free_opacity_(options.free_opacity),
+        support_(static_cast<float>(kSupport * options.voxel_size)),
+        voxel_size_(options.voxel_size),
+        free_weight_(static_cast<float>(1 / (options.voxel_size * options.voxel_size))) {}
+
+  Vote operator()(const PreparedView& view, const Vector3d& x) const {
+    const Vector3d uvz = view.camera.project(x);
+    if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.y() >= 0 && uvz.x() < view.depth.width() &&
+          uvz.y() < view.depth.height()))
+      return {};
+    const int px = static_cast<int>(uvz.x()), py = static_cast<int>(uvz.y());
+    if (!view.has(px, py)) return without_depth(view, uvz);
+    const float z = depth_at(view, uvz.x(), uvz.y());
+    const float along = z - static_cast<float>(uvz.z()), scale = *view.scale.pixel(px, py);
+    if (along < -band_) return {};  // hidden; not by the normal, or outlines would throw long shadows
+    const float distance = along * scale;
+    if (distance >= band_ && beside_surface(view, uvz)) return {};
+    return {std::min(distance, band_), *view.weight.pixel(px, py) * scale * behind(along),
+            std::abs(along) * std::max(scale, kLeastSupportCosine) < support_};
+  }
+
+ private:
+  /// Whether the outline of a surface at this depth passes within a step: then a ray that is free says
+  /// nothing of how far away it is, and thin things would be worn off by all that see past them.
+  bool beside_surface(const PreparedView& view, const Vector3d& uvz) const {
+    const double step = std::clamp(voxel_size_ * view.camera.intrinsics.fx / uvz.z(), 1.0, kFarthestOutline);
+    const auto near = [&](double u, double v) {
+      const int x = static_cast<int>(std::floor(u)), y = static_cast<int>(std::floor(v));
+      return view.has(x, y) && std::abs(*view.depth.pixel(x, y) - static_cast<float>(uvz.z())) < band_;
+    };
+    return near(uvz.x() - step, uvz.y()) || near(uvz.x() + step, uvz.y()) || near(uvz.x(), uvz.y() - step) ||
+           near(uvz.x(), uvz.y() + step);
+  }
+
+  Vote without_depth(const PreparedView& view, const Vector3d& uvz) const {
+    const float opacity = view.opacity.empty()
+                              ? 1.0f
+                              : *view.opacity.pixel(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
+    if (!(opacity < free_opacity_) || beside_surface(view, uvz)) return {};
+    return {band_, free_weight_, false};
+  }
+
+  /// Behind a surface a view knows less and less, so that thin things keep both of their sides.
+  float behind(float distance) const {
+    const float flat = -band_ / 3;
+    return distance > flat ? 1.0f : (distance + band_) / (flat + band_);
+  }
+
+  float band_, free_opacity_, support_;
+  double voxel_size_;
+  float free_weight_;
+};
+
+class Fusion {
+ public:
+  Fusion(int view_count, const FusionViewLoader& load, const FusionOptions& options, RunContext& context)
+      : view_count_(view_count),
+        load_(load),
+        options_(options),
+        context_(context),
+        voxels_(std::make_unique<DistanceField::Voxels>()) {
+    voxels_->origin = options.box.min();
+    voxels_->voxel_size = options.voxel_size;
+    voxels_->band = options.band * options.voxel_size;
+  }
+
+  DistanceField make() {
+    find_places();
+    gather_votes();
+    smooth_distance(*voxels_, options_.smooth, context_.thread_count());
+    fill_unseen(*voxels_, options_.hole_size, context_.thread_count());
+    return DistanceField(std::move(voxels_));
+  }
+
+ private:
+  /// Calls visit(prepared views of a batch) for one batch after the other, in the order of views.
+  template <class Visit>
+  void for_each_batch(const Visit& visit) {
+    for (int begin = 0; begin < view_count_;) {
+      std::vector<PreparedView> batch;
+      std::int64_t pixels = 0;
+      while (begin < view_count_ && (batch.empty() || pixels < kPixelsAtOnce)) {
+        const int count = std::min(view_count_ - begin, context_.thread_count());
+        const std::size_t first = batch.size();
+        batch.resize(first + count);
+        parallel_for(count, context_.thread_count(), [&](std::int64_t i, int) {
+          context_.throw_if_cancelled();
+          batch[first + i] = prepare(load_(begin + static_cast<int>(i)), options_);
+        });
+        for (int i = 0; i < count; ++i)
+          pixels += static_cast<std::int64_t>(batch[first + i].depth.data().size());
+        begin += count;
+      }
+      visit(batch);
+    }
+  }
+
+  /// The corners of the lattice near a depth of any view.
+  void find_places() {
+    MaskTree places;
+    for_each_batch([&](const std::vector<PreparedView>& batch) {
+      std::vector<MaskTree> of_view(batch.size());
+      parallel_for(static_cast<std::int64_t>(batch.size()), context_.thread_count(),
+                   [&](std::int64_t v, int) {
+                     context_.throw_if_cancelled();
+                     mark(batch[v], of_view[v]);
+                   });
+      for (const MaskTree& mask : of_view) places.topologyUnion(mask);
+    });
+    if (places.empty()) throw InvalidInput("no view has depth in the box: there is no surface to make");
+    openvdb::tools::dilateActiveValues(
+        places, static_cast<int>(std::ceil(options_.band)), openvdb::tools::NN_FACE_EDGE_VERTEX,
+        openvdb::tools::IGNORE_TILES);  // others would make tiles of full leaves
+    check_size(places);
+    voxels_->distance = std::make_shared<openvdb::FloatTree>(places, static_cast<float>(voxels_->band),
+                                                             openvdb::TopologyCopy());
+    voxels_->weight = std::make_shared<openvdb::FloatTree>(places, 0.0f, openvdb::TopologyCopy());
+    voxels_->views = std::make_shared<openvdb::FloatTree>(places, 0.0f, openvdb::TopologyCopy());
+  }
+
+  void mark(const PreparedView& view, MaskTree& places) const {
+    openvdb::tree::ValueAccessor<MaskTree> accessor(places);
+    for (int y = 0; y < view.depth.height(); ++y)
+      for (int x = 0; x < view.depth.width(); ++x) {
+        if (!view.has(x, y)) continue;
+        const Vector3d point = pixel_point(view, x, y);
+        if (!options_.box.contains(point)) continue;
+        const Vector3d ijk = (point - voxels_->origin) / voxels_->voxel_size;
+        accessor.setValueOn(Coord::round(openvdb::Vec3d(ijk.x(), ijk.y(), ijk.z())));
+      }
+  }
+
+  void check_size(const MaskTree& places) const {
+    const std::int64_t leaves = static_cast<std::int64_t>(places.leafCount());
+    const std::int64_t bytes = leaves * static_cast<std::int64_t>(kBytesPerLeaf);
+    if (bytes <= options_.most_bytes) return;
+    throw InvalidInput("the surface's lattice of voxels of " + std::to_string(options_.voxel_size) +
+                       " would take " + std::to_string(bytes >> 20) + " MiB: found more than " +
+                       std::to_string(options_.most_bytes >> 20) +
+                       " MiB, expected larger voxels or less to fuse");
+  }
+
+  void gather_votes() {
+    using Manager = openvdb::tree::LeafManager<openvdb::FloatTree>;
+    const Manager distance(*voxels_->distance), weight(*voxels_->weight), views(*voxels_->views);
+    const std::int64_t leaves = static_cast<std::int64_t>(distance.leafCount());
+    parallel_for(leaves, context_.thread_count(),
+                 [&](std::int64_t i, int) { distance.leaf(i).buffer().fill(0); });
+    const Voting vote(options_);
+    for_each_batch([&](const std::vector<PreparedView>& batch) {
+      parallel_for(leaves, context_.thread_count(), [&](std::int64_t i, int) {
+        if (i % 64 == 0) context_.throw_if_cancelled();
+        add_votes(batch, vote, distance.leaf(i), weight.leaf(i), views.leaf(i));
+      });
+    });
+    parallel_for(leaves, context_.thread_count(), [&](std::int64_t i, int) {
+      float* sums = distance.leaf(i).buffer().data();
+      const float* weights = weight.leaf(i).buffer().data();
+      for (std::size_t v = 0; v < Leaf::SIZE; ++v)
+        sums[v] = weights[v] > 0 ? sums[v] / weights[v] : static_cast<float>(voxels_->band);
+    });
+  }
+
+  void add_votes(const std::vector<PreparedView>& batch, const Voting& vote, Leaf& distance, Leaf& weight,
+                 Leaf& views) const {
+    float* distances = distance.buffer().data();
+    float* weights = weight.buffer().data();
+    float* counts = views.buffer().data();
+    for (auto it = distance.cbeginValueOn(); it; ++it) {
+      const Vector3d x = voxels_->position(it.getCoord());
+      const auto n = it.pos();
+      for (const PreparedView& view : batch) {
+        const Vote said = vote(view, x);
+        distances[n] += said.weight * said.distance;
+        weights[n] += said.weight;
+        counts[n] += said.near;
+      }
+    }
+  }
+
+  int view_count_;
+  const FusionViewLoader& load_;
+  const FusionOptions& options_;
+  RunContext& context_;
+  std::unique_ptr<DistanceField::Voxels> voxels_;
+};
+
+}  // namespace
+
+DistanceField::DistanceField(std::unique_ptr<Voxels> voxels) : voxels_(std::move(voxels)) {}
+DistanceField::DistanceField(DistanceField&&) noexcept = default;
+DistanceField& DistanceField::operator=(DistanceField&&) noexcept = default;
+DistanceField::~DistanceField() = default;
+
+std::optional<DistanceField::Sample> DistanceField::at(const Vector3d& x) const {
+  const Vector3d at = (x - voxels_->origin) / voxels_->voxel_size;
+  const Coord ijk = Coord::round(openvdb::Vec3d(at.x(), at.y(), at.z()));
+  if (!voxels_->distance->isValueOn(ijk)) return {};
+  return Sample{voxels_->distance->getValue(ijk), voxels_->weight->getValue(ijk),
+                static_cast<int>(voxels_->views->getValue(ijk))};
+}
+
+std::int64_t DistanceField::sample_count() const {
+  return static_cast<std::int64_t>(voxels_->distance->activeVoxelCount());
+}
+
+std::int64_t DistanceField::bytes() const {
+  return static_cast<std::int64_t>(voxels_->distance->memUsage() + voxels_->weight->memUsage() +
+                                   voxels_->views->memUsage());
+}
+
+double DistanceField::voxel_size() const { return voxels_->voxel_size; }
+
+DistanceField fuse_depth(int view_count, const FusionViewLoader& load, const FusionOptions& options,
+                         RunContext& context) {
+  ROXEL_CHECK(options.voxel_size > 0);
+  ROXEL_CHECK(options.band >= 1);
+  ROXEL_CHECK(!options.box.isEmpty());
+  return Fusion(view_count, load, options, context).make();
+}
+
+}  // namespace roxel

@@ -1,0 +1,144 @@
+#include "roxel/surface/depth_fusion.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "roxel/base/error.h"
+#include "roxel/surface/surface_extraction.h"
+#include "roxel/surface/surface_fixture.h"
+
+namespace roxel {
+namespace {
+
+using Eigen::Vector3d;
+using testing::HasSubstr;
+
+std::vector<FusionView> ball_views() {
+  std::vector<FusionView> views;
+  for (const PinholeCamera& camera : fixture::cameras_around()) views.push_back(fixture::ball_view(camera));
+  return views;
+}
+
+DistanceField fused(const std::vector<FusionView>& views, const FusionOptions& options, int threads = 2) {
+  RunContext context(threads);
+  return fuse_depth(
+      static_cast<int>(views.size()), [&](int v) { return views[v]; }, options, context);
+}
+
+/// A camera at the origin that sees a wall at that distance everywhere.
+FusionView wall(float depth, float variance) {
+  PinholeCamera camera;
+  camera.intrinsics = {32, 32, 40, 40, 16, 16, 0};
+  return {camera, Image(32, 32, 1, depth), Image(32, 32, 1, variance), Image(32, 32, 1, 1.0f), {}};
+}
+
+FusionOptions wall_options() {
+  FusionOptions options;
+  options.voxel_size = 0.1;
+  options.box = {Vector3d(-0.5, -0.5, 1), Vector3d(0.5, 0.5, 4)};
+  options.hole_size = 0;
+  options.smooth = 0;
+  return options;
+}
+
+TEST(DepthFusion, DistanceToABallIsThatOfTheBall) {
+  const DistanceField field = fused(ball_views(), fixture::ball_fusion());
+  int near = 0;
+  for (double r = 0.92; r < 1.04; r += 0.01) {
+    const Vector3d x = r * Vector3d(0.6, 0.64, 0.48);
+    const auto sample = field.at(x);
+    ASSERT_TRUE(sample);
+    // The field answers at the nearest corner, at most half a step away along each axis.
+    const Vector3d corner = ((x.array() + 1.5) / 0.08).round() * 0.08 - 1.5;
+    EXPECT_NEAR(sample->distance, corner.norm() - 1, 0.03) << r;
+    near += sample->views >= 2;
+  }
+  EXPECT_GT(near, 8);
+}
+
+TEST(DepthFusion, ViewsWeighByInverseVariance) {
+  FusionOptions options = wall_options();
+  options.least_sigma = 1e-3;
+  // Variances 1 and 3: the surface is three times nearer to the surer one.
+  const DistanceField field = fused({wall(2.0f, 0.01f), wall(2.1f, 0.03f)}, options);
+  const auto sample = field.at({0, 0, 2.0});
+  ASSERT_TRUE(sample);
+  EXPECT_NEAR(sample->distance, 0.025, 1e-4);
+  EXPECT_NEAR(sample->weight, 100 + 100.0 / 3, 2);  // the wall's normal is that of the middle pixels
+}
+
+TEST(DepthFusion, RefusesVarianceThatIsNoNumber) {
+  FusionView broken = wall(2.0f, 0.01f);
+  for (float& v : broken.variance.data()) v = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(fused({broken}, wall_options()), InvalidInput);
+}
+
+TEST(DepthFusion, HiddenPlacesAreNotSpokenOf) {
+  const DistanceField field = fused({wall(2.0f, 0.01f)}, wall_options());
+  EXPECT_GT(field.at({0, 0, 1.8})->weight, 0);
+  EXPECT_EQ(field.at({0, 0, 2.9}), std::nullopt);
+  EXPECT_LT(field.at({0, 0, 2.2})->weight, field.at({0, 0, 2.0})->weight);
+}
+
+TEST(DepthFusion, EmptyRaysWeighAgainstASurface) {
+  FusionView nothing = wall(0.0f, 0.0f);
+  for (float& a : nothing.opacity.data()) a = 0;
+  const FusionView seen = wall(2.0f, 0.5f);  // not sure at all
+  const double alone = fused({seen}, wall_options()).at({0, 0, 2.1})->distance;
+  const double against = fused({seen, nothing}, wall_options()).at({0, 0, 2.1})->distance;
+  EXPECT_LT(alone, 0);
+  EXPECT_GT(against, 0);
+}
+
+TEST(DepthFusion, IsTheSameForAnyNumberOfThreads) {
+  const auto points_of = [](int threads) {
+    return extract_surface(fused(ball_views(), fixture::ball_fusion(), threads), {}).surface.mesh.points;
+  };
+  const auto one = points_of(1);
+  EXPECT_GT(one.size(), 500u);
+  EXPECT_EQ(one, points_of(2));
+  EXPECT_EQ(one, points_of(4));
+}
+
+TEST(DepthFusion, NoDepthAndTooMuchOfItAreErrors) {
+  try {
+    fused({wall(0.0f, 0.0f)}, wall_options());
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no view has depth"));
+  }
+  FusionOptions fine = wall_options();
+  fine.most_bytes = 1000;
+  try {
+    fused({wall(2.0f, 0.01f)}, fine);
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr("MiB"));
+  }
+}
+
+TEST(DepthFusion, CanBeCancelled) {
+  RunContext context(1);
+  context.cancel();
+  EXPECT_THROW(fuse_depth(
+                   1, [](int) { return wall(2.0f, 0.01f); }, wall_options(), context),
+               Cancelled);
+}
+
+TEST(DepthFusion, SmoothingPullsAtNoise) {
+  const auto roughness = [](double smooth) {
+    std::vector<FusionView> views{wall(2.0f, 0.01f)};
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 32; ++x) *views[0].depth.pixel(x, y) += (x / 4 + y / 4) % 2 ? 0.04f : -0.04f;
+    FusionOptions options = wall_options();
+    options.smooth = smooth;
+    const Surface surface = extract_surface(fused(views, options), {1, 0, 0}).surface;
+    double sum = 0;
+    for (const Vector3d& x : surface.mesh.points) sum += std::abs(x.z() - 2);
+    return sum / static_cast<double>(surface.mesh.points.size());
+  };
+  EXPECT_LT(roughness(2), 0.7 * roughness(0));
+}
+
+}  // namespace
+}  // namespace roxel

@@ -1,0 +1,189 @@
+#include "roxel/surface/surface_extraction.h"
+
+#include <openvdb/tools/VolumeToMesh.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "roxel/surface/distance_voxels.inl"
+
+namespace roxel {
+namespace {
+
+using Eigen::Vector3d;
+using openvdb::Coord;
+
+struct LatticeMesh {
+  std::vector<openvdb::Vec3s> points;  ///< in lattice steps
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+double squared(const openvdb::Vec3s& a, const openvdb::Vec3s& b) { return (a - b).lengthSqr(); }
+
+/// Two triangles along the shorter diagonal. The outside (distance > 0) sees OpenVDB's corners
+/// counterclockwise.
+void add_quad(const openvdb::Vec4I& q, LatticeMesh& mesh) {
+  const auto& p = mesh.points;
+  if (squared(p[q[0]], p[q[2]]) <= squared(p[q[1]], p[q[3]])) {
+    mesh.triangles.push_back({q[0], q[1], q[2]});
+    mesh.triangles.push_back({q[0], q[2], q[3]});
+  } else {
+    mesh.triangles.push_back({q[0], q[1], q[3]});
+    mesh.triangles.push_back({q[1], q[2], q[3]});
+  }
+}
+
+LatticeMesh zero_surface(const openvdb::FloatTree::Ptr& distance) {
+  const openvdb::FloatGrid grid(distance);  // its transform is that of lattice steps
+  openvdb::tools::VolumeToMesh mesher(0.0, 0.0, false);
+  mesher(grid);
+  LatticeMesh mesh;
+  mesh.points.assign(mesher.pointList().get(), mesher.pointList().get() + mesher.pointListSize());
+  for (std::size_t n = 0; n < mesher.polygonPoolListSize(); ++n) {
+    const openvdb::tools::PolygonPool& pool = mesher.polygonPoolList()[n];
+    for (std::size_t i = 0; i < pool.numQuads(); ++i) add_quad(pool.quad(i), mesh);
+    for (std::size_t i = 0; i < pool.numTriangles(); ++i) {
+      const openvdb::Vec3I& t = pool.triangle(i);
+      mesh.triangles.push_back({t[0], t[1], t[2]});
+    }
+  }
+  return mesh;
+}
+
+/// How well a piece of surface is known.
+enum class Support : std::uint8_t {
+  kNone,    ///< at the end of what is known: no surface at all
+  kWeak,    ///< views saw too little of it, or none did and it was carried on from around
+  kStrong,  ///< enough views saw it
+};
+
+class SupportOfCells {
+ public:
+  SupportOfCells(const DistanceField::Voxels& voxels, int min_views)
+      : weight_(*voxels.weight), views_(*voxels.views), min_views_(static_cast<float>(min_views)) {}
+
+  /// Of the cell that a point lies in.
+  Support operator()(const openvdb::Vec3s& point) const {
+    const Coord base = Coord::floor(openvdb::Vec3d(point));
+    bool seen = true;
+    float most = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Coord ijk = base.offsetBy(corner & 1, corner >> 1 & 1, corner >> 2);
+      const float views = views_.getValue(ijk);
+      if (weight_.getValue(ijk) > 0) {
+        most = std::max(most, views);
+      } else {
+        seen = false;
+        if (views != DistanceField::kFilled) return Support::kNone;
+      }
+    }
+    return seen && most >= min_views_ ? Support::kStrong : Support::kWeak;
+  }
+
+ private:
+  openvdb::tree::ValueAccessor<const openvdb::FloatTree> weight_, views_;
+  float min_views_;
+};
+
+/// Of every triangle: that of its weakest point.
+std::vector<Support> support_of_triangles(const LatticeMesh& mesh, const DistanceField::Voxels& voxels,
+                                          int min_views) {
+  const SupportOfCells of_cell(voxels, min_views);
+  std::vector<Support> of_point(mesh.points.size());
+  for (std::size_t i = 0; i < of_point.size(); ++i) of_point[i] = of_cell(mesh.points[i]);
+  std::vector<Support> support(mesh.triangles.size());
+  for (std::size_t t = 0; t < support.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    support[t] = std::min({of_point[a], of_point[b], of_point[c]});
+  }
+  return support;
+}
+
+/// The longest side of each component's box, lattice steps.
+std::vector<double> extents(const LatticeMesh& mesh, const Components& components) {
+  std::vector<Eigen::AlignedBox3f> boxes(components.count);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (components.of_triangle[t] == kNoComponent) continue;
+    for (const std::uint32_t corner : mesh.triangles[t]) {
+      const openvdb::Vec3s& p = mesh.points[corner];
+      boxes[components.of_triangle[t]].extend(Eigen::Vector3f(p.x(), p.y(), p.z()));
+    }
+  }
+  std::vector<double> sides;
+  for (const auto& box : boxes) sides.push_back(box.sizes().maxCoeff());
+  return sides;
+}
+
+Mesh topology_of(const LatticeMesh& mesh) {
+  Mesh out;
+  out.points.resize(mesh.points.size());
+  out.triangles = mesh.triangles;
+  return out;
+}
+
+/// Takes out parts of less extent than that; returns how many triangles.
+std::int64_t drop_small_parts(const LatticeMesh& mesh, const Mesh& topology, double smallest,
+                              std::vector<std::uint8_t>& keep) {
+  const Components parts = connected_components(topology, keep);
+  const std::vector<double> sides = extents(mesh, parts);
+  std::int64_t dropped = 0;
+  for (std::size_t t = 0; t < keep.size(); ++t)
+    if (keep[t] && sides[parts.of_triangle[t]] < smallest) {
+      keep[t] = 0;
+      ++dropped;
+    }
+  return dropped;
+}
+
+/// Adds what closes small holes: weak pieces all of whose edges lie on kept surface. Returns how many
+/// triangles.
+std::int64_t close_holes(const LatticeMesh& mesh, const Mesh& topology, const std::vector<Support>& support,
+                         double hole_size, std::vector<std::uint8_t>& keep) {
+  std::vector<std::uint8_t> weak(keep.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) weak[t] = !keep[t] && support[t] != Support::kNone;
+  const Components pieces = connected_components(topology, weak);
+  std::vector<double> sides = extents(mesh, pieces);
+  const auto neighbours = face_neighbours(topology);
+  std::vector<std::uint8_t> rimmed(
+      pieces.count);  // a closed piece that touches nothing is no hole, but debris
+  for (std::size_t t = 0; t < keep.size(); ++t) {
+    if (!weak[t]) continue;
+    for (const std::int32_t n : neighbours[t]) {
+      if (n >= 0 && keep[n]) rimmed[pieces.of_triangle[t]] = 1;
+      if (n < 0 || !(keep[n] || weak[n]))
+        sides[pieces.of_triangle[t]] = std::numeric_limits<double>::infinity();
+    }
+  }
+  std::int64_t closed = 0;
+  for (std::size_t t = 0; t < keep.size(); ++t)
+    if (weak[t] && rimmed[pieces.of_triangle[t]] && sides[pieces.of_triangle[t]] <= hole_size) {
+      keep[t] = 1;
+      ++closed;
+    }
+  return closed;
+}
+
+}  // namespace
+
+Extraction extract_surface(const DistanceField& field, const ExtractionOptions& options) {
+  const DistanceField::Voxels& voxels = field.voxels();
+  const LatticeMesh mesh = zero_surface(voxels.distance);
+  Surface whole;
+  whole.mesh = topology_of(mesh);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    const openvdb::Vec3s& p = mesh.points[i];
+    whole.mesh.points[i] = voxels.origin + voxels.voxel_size * Vector3d(p.x(), p.y(), p.z());
+  }
+  Extraction out;
+  const std::vector<Support> support = support_of_triangles(mesh, voxels, options.min_views);
+  std::vector<std::uint8_t> keep(support.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) keep[t] = support[t] == Support::kStrong;
+  out.unsupported = std::count(keep.begin(), keep.end(), 0);
+  out.debris = drop_small_parts(mesh, whole.mesh, options.smallest_part, keep);
+  out.closed = close_holes(mesh, whole.mesh, support, options.hole_size, keep);
+  out.unsupported -= out.closed;
+  out.surface = kept_triangles(whole, keep);
+  return out;
+}
+
+}  // namespace roxel

@@ -1,0 +1,160 @@
+#!/usr/bin/env python3
+"""Tests of `roxel mesh` and of the mesh stage of `roxel reconstruct`, on a small synthetic data set.
+
+    mesh_test.py ROXEL [unittest arguments]
+"""
+
+import json
+import resource
+import shutil
+import signal
+import struct
+import subprocess
+import unittest
+
+import cli_test
+from cli_test import Case, digest, files_below, run
+
+MESH_FILES = ["mesh.glb", "mesh.mtl", "mesh.obj", "mesh.ply", "mesh.png", "mesh_turntable.jpg", "mesh_views.png"]
+SMALL = ["--resolution", "40", "--levels", "2", "--passes", "4", "--no-render", "--no-report"]
+
+# Each option of the surface: what is asked for besides, a value that must change the result, and where it shows.
+CHANGES = {
+    "colors": ([], ["--colors", "image"], "mesh.ply"),
+    "faces": ([], ["--faces", "500"], "mesh.ply"),
+    "hole-size": ([], ["--hole-size", "0"], "mesh.ply"),
+    "level-seams": ([], ["--no-level-seams"], "mesh.png"),
+    "mesh-band": ([], ["--mesh-band", "2"], "mesh.ply"),
+    "mesh-error": ([], ["--mesh-error", "1"], "mesh.ply"),
+    "mesh-smooth": ([], ["--mesh-smooth", "3"], "mesh.ply"),
+    "mesh-voxel-size": ([], ["--mesh-voxel-size", "0.15"], "mesh.ply"),
+    "min-views": ([], ["--min-views", "4"], "mesh.ply"),
+    "seam-cost": ([], ["--seam-cost", "0"], "mesh.png"),
+    "smallest-part": (["--min-views", "1"], ["--smallest-part", "0"], "mesh.ply"),
+    "texture": ([], ["--texture", "jpeg"], "mesh.glb"),
+    "texture-size": ([], ["--texture-size", "200"], "mesh.png"),
+    "transient": ([], ["--transient", "0.01"], "mesh.png"),
+}
+
+
+def full_disc():
+    """For a child process: no file grows past 20 kB."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+
+def bounds_of(ply):
+    """Number of points and triangles, and the box, of a mesh.ply with float coordinates and colours."""
+    data = ply.read_bytes()
+    head, _, rows = data.partition(b"end_header\n")
+    count = {line.split()[1]: int(line.split()[2]) for line in head.decode().splitlines() if line.startswith("element")}
+    points = [struct.unpack_from("<3f", rows, 27 * i) for i in range(count["vertex"])]
+    return count["vertex"], count["face"], [(min(a), max(a)) for a in zip(*points)]
+
+
+class Mesh(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.photographs = cls.folder / "photographs"
+        cls.synth(cls.photographs, 16, "128x96")
+        cls.run_folder = cls.folder / "run"
+        done = run("reconstruct", cls.photographs, "-o", cls.run_folder, *SMALL, "--json")
+        assert done.returncode == 0, done.stderr
+        cls.summary = json.loads(done.stdout)
+
+    def mesh(self, name, *arguments):
+        out = self.folder / name
+        self.succeed("mesh", self.run_folder, "-o", out, *arguments, "--quiet")
+        return out
+
+    def test_reconstruct_makes_it_unless_told_not_to(self):
+        self.assertEqual([f for f in files_below(self.run_folder) if f.startswith("mesh")], MESH_FILES)
+        mesh = self.summary["mesh"]
+        points, triangles, box = bounds_of(self.run_folder / "mesh.ply")
+        self.assertEqual((mesh["points"], mesh["triangles"]), (points, triangles))
+        self.assertGreater(triangles, 1000)
+        for low, high in box:
+            self.assertTrue(-2 < low < high < 2.5, box)
+        self.assertGreater(mesh["texture"]["charts"], 4)
+        self.assertLess(mesh["texture"]["seam_rms"], mesh["texture"]["seam_rms_before"])
+        for stage in mesh["stages"] + self.summary["stages"]:
+            self.assertGreater(stage["peak_memory_bytes"], 1e6)
+        self.assertIn("mesh", [stage["name"] for stage in self.summary["stages"]])
+
+    def test_the_command_does_what_the_stage_does(self):
+        again = self.mesh("again", "--threads", 1)
+        for name in MESH_FILES:
+            self.assertEqual(digest(again / name), digest(self.run_folder / name), name)
+        figures = json.loads((again / "mesh.json").read_text())
+        self.assertEqual(figures["triangles"], self.summary["mesh"]["triangles"])
+
+    def test_the_run_s_own_mesh_is_replaced_as_a_whole(self):
+        copy = self.folder / "copy"
+        shutil.copytree(self.run_folder, copy)
+        self.succeed("mesh", copy, "--texture", "none", "--no-mesh-pictures", "--faces", "600", "--quiet")
+        self.assertEqual([f for f in files_below(copy) if f.startswith("mesh")], ["mesh.ply"])
+        summary = json.loads((copy / "summary.json").read_text())
+        self.assertLessEqual(summary["mesh"]["triangles"], 600)
+        self.assertEqual(summary["passes"], self.summary["passes"])
+
+    def test_every_option_changes_something(self):
+        self.assertEqual(set(CHANGES) | {"mesh", "mesh-pictures"}, cli_test.MESH)
+        known = {}
+        for option, (base, change, name) in CHANGES.items():
+            with self.subTest(option):
+                key = tuple(base)
+                if key not in known:
+                    known[key] = self.mesh("base" + "".join(base), *base, "--no-mesh-pictures")
+                changed = self.mesh("changed", *base, *change, "--no-mesh-pictures")
+                self.assertNotEqual(digest(known[key] / name), digest(changed / name))
+
+    def test_failures_leave_the_earlier_mesh(self):
+        before = {f: digest(self.run_folder / f) for f in files_below(self.run_folder)}
+        table = [("no surface that 50 views agree on", ["--min-views", "50"]),
+                 ("--faces: ", ["--faces", "4"]),
+                 ("--mesh-voxel-size: found 0.0005, expected at least", ["--mesh-voxel-size", "0.0005"]),
+                 ("nothing-here", ["--dataset", self.folder / "nothing-here"])]
+        for message, arguments in table:
+            with self.subTest(message):
+                self.expect_error(2, message, "mesh", self.run_folder, *arguments, "--quiet")
+        self.expect_error(1, "cannot be made", "mesh", self.run_folder, "-o", "/proc/roxel", "--quiet")
+        self.expect_error(2, "a folder that is read", "mesh", self.run_folder, "-o", self.run_folder)
+        full = subprocess.run([cli_test.ROXEL, "mesh", str(self.run_folder), "--quiet"], capture_output=True, text=True, timeout=120,
+                              preexec_fn=full_disc)
+        self.assertEqual(full.returncode, 1, full.stderr)
+        self.assertEqual({f: digest(self.run_folder / f) for f in files_below(self.run_folder)}, before)
+
+    def test_a_run_without_depth_has_no_mesh(self):
+        bare = self.folder / "bare"
+        self.succeed("reconstruct", self.photographs, "-o", bare, *SMALL, "--no-depth", "--quiet")
+        self.assertIsNone(json.loads((bare / "summary.json").read_text())["mesh"])
+        self.expect_error(2, "no depth/NAME.exr", "mesh", bare, "--quiet")
+
+    def test_a_depth_map_of_another_size_is_named(self):
+        copy = self.folder / "mixed"
+        shutil.copytree(self.run_folder, copy)
+        small, _ = self.reconstruct("small")
+        shutil.copy(small / "depth/000.exr", copy / "depth/000.exr")
+        self.expect_error(2, "000.exr: found 64 x 48 pixels, expected 128 x 96", "mesh", copy, "--quiet")
+
+    def test_eval_measures_it_where_there_is_a_true_surface(self):
+        truth = self.folder / "truth"
+        truth.mkdir()
+        shutil.copy(self.run_folder / "mesh.ply", truth / "mesh.ply")
+        found = json.loads(self.succeed("eval", self.run_folder, "--truth", truth, "--json").stdout)["surfaces"][-1]
+        self.assertEqual(found["name"], "mesh")
+        self.assertGreater(found["within"][0]["f_score"], 0.999)
+
+    def test_the_report_shows_it(self):
+        out = self.folder / "shown"
+        arguments = [a for a in SMALL if a != "--no-report"]
+        self.succeed("reconstruct", self.photographs, "-o", out, *arguments, "--quiet")
+        page = (out / "report.html").read_text()
+        self.assertIn("<h2>Surface</h2>", page)
+        self.assertIn('class="turntable"', page)
+        self.assertIn("textured", page)
+
+
+if __name__ == "__main__":
+    cli_test.main()
