@@ -6,7 +6,7 @@
 #include "command.h"
 #include "common.h"
 #include "dense_workspace.h"
-#include "eval_source.h"
+#include "run_input.h"
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 #include "roxel/io/dataset_writer.h"

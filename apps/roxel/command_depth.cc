@@ -7,7 +7,7 @@
 #include "command.h"
 #include "common.h"
 #include "depth_files.h"
-#include "eval_source.h"
+#include "run_input.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
 #include "roxel/io/depth_file.h"

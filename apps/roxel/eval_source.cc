@@ -78,19 +78,6 @@ void read_held_out(const Session& session, EvalSource& source) {
 
 }  // namespace
 
-InputOptions input_options_of(const FinishedRun& run) {
-  InputOptions options;
-  const auto text = [&](const char* name, auto& target) {
-    if (const nlohmann::json& value = run.option(name); value.is_string()) target = value.get<std::string>();
-  };
-  text("format", options.format);
-  text("images", options.images);
-  text("nodes", options.nodes);
-  text("masks", options.masks);
-  text("response", options.response);
-  return options;
-}
-
 const View* EvalSource::view(const std::string& name) const {
   const auto found = views.find(name);
   return found == views.end() ? nullptr : found->second;

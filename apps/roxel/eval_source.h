@@ -39,9 +39,6 @@ struct EvalSource {
   Response picture_response() const;
 };
 
-/// Input options as the run used them.
-InputOptions input_options_of(const FinishedRun& run);
-
 /// A folder with true depth, a true mesh, true colours or held-out views in it.
 bool has_truth(const std::filesystem::path& folder);
 

@@ -24,7 +24,7 @@ WORLDS = {"plane": "a printed board", "head": "a head on a turntable", "mug": "a
 CHOICES = [("exponential", "rgb"), ("gaussian", "rgb"), ("gaussian", "luv"), ("exponential", "luv")]
 UPDATES = ["posterior", "roxels"]
 SEED = 1
-OPACITY_THRESHOLD = 0.04
+OPACITY_THRESHOLD = 0.3
 
 # [Jethwa04] tables 8.1 and 8.2: voxels, close to the truth (%), distance-weighted mean opacity (%).
 THESIS = {
@@ -93,7 +93,7 @@ def measure(run, options):
     data, made, metrics = options.work / run[0], work / run_name(run), work / (run_name(run) + "-metrics")
     anew = make([roxel, "synth", run[0], "-o", str(data), "--seed", str(SEED), "--quiet"], data, "transforms.json")
     command = [roxel, "reconstruct", str(data), "-o", str(made), *reconstruct_options(run, options.resolution)]
-    if make([*command, "--no-report", "--quiet"], made, "summary.json") or anew:
+    if make([*command, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet"], made, "summary.json") or anew:
         shutil.rmtree(metrics, ignore_errors=True)
     make([roxel, "eval", str(made), "--truth", str(data), "-o", str(metrics), "--opacity-threshold",
           str(OPACITY_THRESHOLD), "--distances", f"{one_percent_of_diagonal(data):.6g}", "--quiet"], metrics, "metrics.json")
