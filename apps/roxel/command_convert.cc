@@ -6,12 +6,12 @@
 #include "command.h"
 #include "common.h"
 #include "dense_workspace.h"
-#include "run_input.h"
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 #include "roxel/io/dataset_writer.h"
 #include "roxel/io/image_file.h"
 #include "roxel/report/run_record.h"
+#include "run_input.h"
 
 namespace roxel::cli {
 namespace {

@@ -7,12 +7,12 @@
 #include "command.h"
 #include "common.h"
 #include "depth_files.h"
-#include "run_input.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/report/run_record.h"
 #include "roxel/solve/run_stages.h"
+#include "run_input.h"
 #include "sky_stage.h"
 
 namespace roxel::cli {
