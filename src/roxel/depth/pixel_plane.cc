@@ -1,5 +1,6 @@
 #include "roxel/depth/pixel_plane.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
