@@ -1,6 +1,7 @@
 #include "roxel/depth/propagate_depth.h"
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include <chrono>
 #include <cmath>

@@ -1,5 +1,6 @@
 #include "roxel/depth/refine_view.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <bit>
 #include <cmath>
