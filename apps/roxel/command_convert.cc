@@ -69,9 +69,7 @@ void write_view(const fs::path& folder, const PhotographLoader& load, View& view
 int convert_run(const Invocation& invocation, const ConvertOptions& options) {
   Session session(options.common);
   const FinishedRun run = read_run(invocation.inputs.front());
-  if (run.file.info.dataset.empty())
-    throw_invalid(run.path.string(), "a run that names no data set", "a run of roxel reconstruct");
-  const Input input = read_input(run.file.info.dataset, input_options_of(run), session);
+  const Input input = read_input_of(run, std::nullopt, session);
   protect_sources(invocation.output, {{run.path}, &input.dataset});
   const OutputFolder folder(invocation.output);
   PartialResults results(folder.path());

@@ -51,12 +51,6 @@ ReconstructOptions options_of(const FinishedRun& run) {
   return options;
 }
 
-Input read_input_of(const FinishedRun& run, const DepthCommandOptions& options, const Session& session) {
-  const std::string path = options.dataset.value_or(run.file.info.dataset);
-  if (path.empty()) throw_invalid(run.path.string(), "a run that names no data set", "--dataset DATASET");
-  return read_input(path, input_options_of(run), session);
-}
-
 bool has_depth_maps(const fs::path& run, const Dataset& dataset) {
   return std::all_of(dataset.views.begin(), dataset.views.end(),
                      [&](const View& view) { return fs::is_regular_file(depth_path(run, view.name)); });
@@ -115,7 +109,7 @@ int run_depth(const Invocation& invocation, const DepthCommandOptions& options) 
   if (run.file.volume.box_slot_count() == 0)
     throw_invalid((run.path / "volume.vdb").string(), "no voxels", "a volume with voxels in its box");
   const double voxel_size = run.file.volume.index(0).frame().voxel_size;
-  const Input input = read_input_of(run, options, session);
+  const Input input = read_input_of(run, options.dataset, session);
   const OutputFolder folder(run.path);
   PartialResults results(folder.path());
   double begin = 0;

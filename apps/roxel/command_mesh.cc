@@ -42,14 +42,6 @@ OptionTable<MeshCommandOptions> mesh_table() {
   return table;
 }
 
-Input read_photographs(const FinishedRun& run, const MeshCommandOptions& options, const Session& session) {
-  const std::string path = options.source.dataset.value_or(run.file.info.dataset);
-  if (path.empty() || !fs::exists(path))
-    throw_invalid(run.path.string(), "a run whose data set \"" + path + "\" is not there",
-                  "--dataset DATASET");
-  return read_input(path, input_options_of(run), session);
-}
-
 /// The run's summary tells of its newest mesh.
 void write_figures(const FinishedRun& run, const fs::path& folder, bool own_folder,
                    const nlohmann::ordered_json& figures) {
@@ -63,7 +55,7 @@ void write_figures(const FinishedRun& run, const fs::path& folder, bool own_fold
 int run_mesh(const Invocation& invocation, const MeshCommandOptions& options) {
   Session session(options.common);
   const FinishedRun run = read_run(invocation.inputs.front());
-  const Input input = read_photographs(run, options, session);
+  const Input input = read_input_of(run, options.source.dataset, session);
   const bool own_folder = invocation.output.empty();
   const fs::path target = own_folder ? run.path : invocation.output;
   if (!own_folder) protect_sources(target, {{run.path}, &input.dataset});

@@ -4,6 +4,16 @@
 
 namespace roxel::cli {
 
+Input read_input_of(const FinishedRun& run, const std::optional<std::string>& dataset,
+                    const Session& session) {
+  const std::string path = dataset.value_or(run.file.info.dataset);
+  if (path.empty() || !std::filesystem::exists(path))
+    throw_invalid(
+        run.path.string(), "a run whose data set \"" + path + "\" is not there",
+        "photographs where the run has read them, or --dataset DATASET for roxel depth and roxel mesh");
+  return read_input(path, input_options_of(run), session);
+}
+
 Eigen::AlignedBox3d box_of(const FinishedRun& run) {
   const nlohmann::json bounds =
       run.summary.value("scene", nlohmann::json::object()).value("bounds", nlohmann::json());

@@ -9,6 +9,11 @@ namespace roxel::cli {
 /// Input options as the run used them.
 InputOptions input_options_of(const FinishedRun& run);
 
+/// The run's photographs, from `dataset` or else from where the run has read them. Throws InvalidInput where
+/// they are not there.
+Input read_input_of(const FinishedRun& run, const std::optional<std::string>& dataset,
+                    const Session& session);
+
 /// The bounds of the summary, or the box of the lattice where it has none. Throws InvalidInput where they are
 /// damaged.
 Eigen::AlignedBox3d box_of(const FinishedRun& run);
