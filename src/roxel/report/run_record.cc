@@ -255,7 +255,7 @@ void remove_results(const fs::path& run) {
        {"volume.vdb", "voxels.ply", "overview.png", "report.html", "mesh.ply", "mesh.glb", "mesh.obj",
         "mesh.mtl", "mesh.png", "mesh.jpg", "mesh_views.png", "mesh_turntable.jpg"})
     fs::remove(run / name, ignored);
-  if (!fs::is_symlink(run / "sky")) fs::remove_all(run / "sky", ignored);
+  if (summary.contains("skies") && !fs::is_symlink(run / "sky")) fs::remove_all(run / "sky", ignored);
   try {
     for (const json& view : summary.value("views", json::array())) {
       const std::string name = view.value("name", "");
