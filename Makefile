@@ -4,7 +4,7 @@
 #   make demo     build, reconstruct a small synthetic world, say where the pictures are
 #   make build    build everything
 #   make bench    build and run the benchmarks
-#   make results  make the thesis's tables and figures anew in docs/results; some ten minutes
+#   make results  make the thesis's tables and figures anew in docs/results; some forty minutes
 #   make format   format the sources
 #   make docs     write docs/options.md anew from the options table
 #
@@ -41,9 +41,12 @@ bench:
 
 results: setup
 	cmake --preset $(PRESET) -DROXEL_BUILD_BENCHMARKS=ON
-	cmake --build --preset $(PRESET) -j $(JOBS) --target roxel agreement_figures
+	cmake --build --preset $(PRESET) -j $(JOBS) --target roxel agreement_figures contact_sheet facade_figure update_figure
 	build/$(PRESET)/benchmarks/quality/agreement_figures docs/results
-	benchmarks/quality/tables.py --roxel build/$(PRESET)/apps/roxel/roxel
+	build/$(PRESET)/benchmarks/quality/update_figure docs/results
+	benchmarks/quality/tables.py --roxel build/$(PRESET)/apps/roxel/roxel --sheets build/$(PRESET)/benchmarks/quality/contact_sheet
+	build/$(PRESET)/benchmarks/quality/facade_figure build/quality/street docs/results
+	benchmarks/quality/figures.py --roxel build/$(PRESET)/apps/roxel/roxel --sheets build/$(PRESET)/benchmarks/quality/contact_sheet
 	benchmarks/quality/sky_table.py --roxel build/$(PRESET)/apps/roxel/roxel
 
 format:

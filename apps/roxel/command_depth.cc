@@ -13,6 +13,7 @@
 #include "roxel/report/run_record.h"
 #include "roxel/solve/run_stages.h"
 #include "run_input.h"
+#include "run_report.h"
 #include "sky_stage.h"
 
 namespace roxel::cli {
@@ -83,11 +84,12 @@ void march(FinishedRun& run, Input input, const fs::path& results, RunContext& c
                          write_depth(depth_path(results, input.dataset.views[result.view_idx].name),
                                      {result.depth.depth, result.depth.variance, result.depth.opacity});
                        });
+  run.file.volume = std::move(made.volume);
 }
 
 /// The run's summary with this stage's figures in the place of older ones.
-std::string new_summary(const FinishedRun& run, const DepthStageFigures& figures,
-                        const nlohmann::ordered_json& options) {
+nlohmann::ordered_json new_summary(const FinishedRun& run, const DepthStageFigures& figures,
+                                   const nlohmann::ordered_json& options) {
   nlohmann::ordered_json summary(run.summary);
   const std::vector<StageRecord> records = stage_records(figures);
   nlohmann::ordered_json stages = nlohmann::ordered_json::array();
@@ -100,7 +102,7 @@ std::string new_summary(const FinishedRun& run, const DepthStageFigures& figures
   summary["stages"] = stages;
   for (const auto& [name, value] : options.items()) summary["options"][name] = value;
   summary["depth"] = to_json(figures);
-  return json_text(summary);
+  return summary;
 }
 
 int run_depth(const Invocation& invocation, const DepthCommandOptions& options) {
@@ -121,10 +123,17 @@ int run_depth(const Invocation& invocation, const DepthCommandOptions& options) 
       refine_depth_files(input.dataset, input.load, {run.file.info.exposure, voxel_size},
                          {results.path(), run.path}, options.stage, session.context(), begin, 1);
   session.context().throw_if_cancelled();
-  write_text_atomically(results.path() / "summary.json",
-                        new_summary(run, figures, depth_option_table().to_json(options.stage)) + "\n");
+  const nlohmann::ordered_json summary =
+      new_summary(run, figures, depth_option_table().to_json(options.stage));
+  if (has_report(run))
+    write_run_report({run, input, {results.path(), run.path}, summary}, mesh_pictures_of(run.path),
+                     session.context());
+  write_text_atomically(results.path() / "summary.json", json_text(summary) + "\n");
   results.publish();
   session.display().clear();
+  if (fs::is_regular_file(run.path / "mesh.ply"))
+    warn(options.common, "the mesh is still that of the earlier depth maps: roxel mesh " + run.path.string() +
+                             " makes it anew");
   print_result(options.common, brief(figures) + "written to " + run.path.string() + "\n",
                json_text(to_json(figures)));
   return 0;

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.h"
+#include "common.h"
 #include "eval_measure.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
@@ -20,8 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Response kAsItIs{ResponseCurve::kLinear};
-
 struct TruthOptions {
   std::optional<std::string> truth;
   std::optional<std::string> dataset;
@@ -32,6 +31,7 @@ struct MeasureSwitches {
   std::optional<std::string> distances;
   std::optional<std::string> estimate;
   double opacity_threshold = 0.04;
+  double confidence_threshold = 0.001;
   int views_agree = 2;
   int samples = 200000;
   std::int64_t seed = 1;
@@ -80,6 +80,12 @@ OptionTable<MeasureSwitches> measure_table() {
       .help("Voxels of at least this opacity are measured")
       .range(0, 0.999)
       .source("the default of reconstruct; fixed, so that runs compare");
+  table.add("confidence-threshold", &MeasureSwitches::confidence_threshold)
+      .help(
+          "Of these, those of at least this confidence: what hardly any photograph has looked at does not "
+          "count")
+      .range(0, 0.999)
+      .source("the default of reconstruct; fixed, so that runs compare");
   table.add("views-agree", &MeasureSwitches::views_agree)
       .help("Depth maps that must agree on a point of the stricter set of depth points")
       .range(2, 1000);
@@ -125,6 +131,7 @@ MeasureOptions measure_options(const MeasureSwitches& switches) {
   options.depth_within = parse_distances(switches.depth_within, "--depth-within");
   options.distances = parse_distances(switches.distances, "--distances");
   options.opacity_threshold = switches.opacity_threshold;
+  options.confidence_threshold = switches.confidence_threshold;
   options.views_agree = switches.views_agree;
   options.samples = switches.samples;
   options.seed = static_cast<std::uint64_t>(switches.seed);
@@ -207,12 +214,12 @@ void remove_file(const fs::path& file) {
 
 /// The files of an earlier eval, metrics.json first, so that measures of two never mix. Does nothing where
 /// there is no metrics.json.
-void remove_older(const fs::path& folder) {
+void remove_older_measures(const fs::path& folder) {
   if (!fs::is_regular_file(folder / "metrics.json")) return;
   for (const char* name : {"metrics.json", "report.html", "section_x.svg", "section_y.svg", "section_z.svg"})
     remove_file(folder / name);
   for (const char* name : {"depth", "depth_error_over_sigma", "opacity_reliability", "surfaces",
-                           "voxel_distances", "voxel_opacities", "images", "held_out", "skies"})
+                           "voxel_distances", "voxel_opacities", "images", "held_out", "light", "skies"})
     for (const char* suffix : {".csv", ".svg"}) remove_file(folder / (std::string(name) + suffix));
   const auto surface_plot = [&](int number) {
     return folder / ("surface_" + std::to_string(number) + ".svg");
@@ -255,7 +262,7 @@ int run_eval_sky(const Invocation& invocation, const EvalOptions& options, Sessi
     PartialResults partial(folder.path());
     write_text_atomically(partial.path() / "skies.csv", csv_table(measures.skies));
     write_text_atomically(partial.path() / "metrics.json", json + "\n");
-    partial.publish([&] { remove_older(folder.path()); });
+    partial.publish([&] { remove_older_measures(folder.path()); });
   }
   session.display().clear();
   print_result(options.common, to_text(measures), json);
@@ -282,7 +289,7 @@ int run_eval(const Invocation& invocation, const EvalOptions& options) {
   if (folder) {
     PartialResults partial(folder->path());
     write_files(partial.path(), source, measures, json);
-    partial.publish([&] { remove_older(folder->path()); });
+    partial.publish([&] { remove_older_measures(folder->path()); });
   }
   session.display().clear();
   print_result(options.common, to_text(measures), json);

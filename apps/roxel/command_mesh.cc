@@ -8,6 +8,7 @@
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
 #include "run_input.h"
+#include "run_report.h"
 
 namespace roxel::cli {
 namespace {
@@ -42,14 +43,15 @@ OptionTable<MeshCommandOptions> mesh_table() {
   return table;
 }
 
-/// The run's summary tells of its newest mesh.
-void write_figures(const FinishedRun& run, const fs::path& folder, bool own_folder,
-                   const nlohmann::ordered_json& figures) {
-  if (!own_folder) return write_text_atomically(folder / "mesh.json", json_text(figures) + "\n");
+/// The run's summary and page tell of its newest mesh.
+void renew_run(const FinishedRun& run, const Input& input, MeshResult result, const fs::path& results,
+               const RunContext& context) {
   std::ifstream in(run.path / "summary.json");
   nlohmann::ordered_json summary = nlohmann::ordered_json::parse(in);
-  summary["mesh"] = figures;
-  write_text_atomically(folder / "summary.json", json_text(summary) + "\n");
+  summary["mesh"] = std::move(result.figures);
+  if (has_report(run))
+    write_run_report({run, input, {results, run.path}, summary}, std::move(result.pictures), context);
+  write_text_atomically(results / "summary.json", json_text(summary) + "\n");
 }
 
 int run_mesh(const Invocation& invocation, const MeshCommandOptions& options) {
@@ -64,15 +66,19 @@ int run_mesh(const Invocation& invocation, const MeshCommandOptions& options) {
   const MeshInput source{input.dataset, input.load, run.file.volume, run.file.info, box_of(run), run.path};
   MeshResult result = make_mesh(source, options.mesh, partial.path(), session.context());
   result.figures["options"] = mesh_option_table().to_json(options.mesh);
-  write_figures(run, partial.path(), own_folder, result.figures);
+  const std::string figures = json_text(result.figures);
+  if (own_folder) {
+    renew_run(run, input, result, partial.path(), session.context());
+  } else {
+    write_text_atomically(partial.path() / "mesh.json", figures + "\n");
+  }
   partial.publish([&] {
     std::error_code ignored;
     for (const std::string& name : mesh_files()) fs::remove(target / name, ignored);
   });
   for (const std::string& warning : result.warnings) warn(options.common, warning);
   session.display().clear();
-  print_result(options.common, result.text + "written to " + target.string() + "\n",
-               json_text(result.figures));
+  print_result(options.common, result.text + "written to " + target.string() + "\n", figures);
   return 0;
 }
 

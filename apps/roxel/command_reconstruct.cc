@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cinttypes>
+#include <limits>
 
 #include "command.h"
 #include "dense_workspace.h"
@@ -11,9 +12,14 @@
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/content_hash.h"
 #include "roxel/base/error.h"
+#include "roxel/base/formatted.h"
 #include "roxel/base/parallel.h"
 #include "roxel/eval/volume_accuracy.h"
+#include "roxel/io/depth_file.h"
 #include "roxel/io/voxels_ply.h"
+#include "roxel/solve/estimate.h"
+#include "run_checkpoints.h"
+#include "sky_again.h"
 #include "sky_stage.h"
 #include "view_writer.h"
 
@@ -30,6 +36,9 @@ enum class Export { kNone, kColmap };
 struct StageSwitches {
   std::optional<std::string> init;
   std::optional<std::string> sky;
+  std::optional<std::array<double, 2>> sun;
+  std::optional<std::string> sky_masks;
+  bool sky_again = false;
   bool dry_run = false;
   bool depth = true;
   bool render = true;
@@ -45,6 +54,7 @@ struct RunOptions {
   MeshOptions mesh;
   InputOptions input;
   StageSwitches stages;
+  CheckpointOptions checkpoints;
   CommonOptions common;
 };
 
@@ -59,6 +69,21 @@ OptionTable<StageSwitches> stage_table() {
       .help("Take the skies and sky masks of this run, of roxel sky or roxel reconstruct")
       .placeholder("RUN")
       .unset("fitted anew for --illumination sky, else none");
+  table.add("sun", &StageSwitches::sun)
+      .help(
+          "Where the sun stands, for skies that are fitted anew: degrees clockwise from north (+Y), degrees "
+          "above the horizon")
+      .placeholder("AZ,EL")
+      .unit("degrees")
+      .range(-360, 360)
+      .unset("from time and place, else the brightest spot");
+  table.add("sky-masks", &StageSwitches::sky_masks)
+      .help("Folder of masks NAME.png by hand, 255 = sky, for skies that are fitted anew")
+      .placeholder("DIR")
+      .unset("found from variance, colour and luminance");
+  table.add("sky-again", &StageSwitches::sky_again)
+      .help("After the first level, fit skies again with the rays that the volume leaves unexplained")
+      .source("[Jethwa04] section 7.2.2");
   table.add("dry-run", &StageSwitches::dry_run)
       .help("Say what would be done, and what memory and time it would take");
   table.add("depth", &StageSwitches::depth).help("Depth maps: depth/NAME.exr and .png");
@@ -78,6 +103,7 @@ OptionTable<RunOptions> run_table() {
   OptionTable<RunOptions> table;
   table.include(input_option_table(), &RunOptions::input);
   table.include(stage_table(), &RunOptions::stages);
+  table.include(checkpoint_option_table(), &RunOptions::checkpoints);
   table.include(reconstruct_option_table(), &RunOptions::reconstruct);
   table.include(depth_option_table(), &RunOptions::depth);
   table.include(mesh_option_table(), &RunOptions::mesh);
@@ -134,6 +160,18 @@ std::string pass_text(const PassRecord& record, const ReconstructOptions& option
   return text;
 }
 
+/// Whether all photographs say when and where they were taken, and some are more than a quarter of an hour
+/// apart.
+bool several_times_of_day(const Dataset& dataset) {
+  constexpr double kSameLight_s = 900;
+  double first = std::numeric_limits<double>::infinity(), last = -first;
+  for (const View& view : dataset.views) {
+    if (!view.time_utc_s || !view.latitude_deg || !view.longitude_deg) return false;
+    first = std::min(first, *view.time_utc_s), last = std::max(last, *view.time_utc_s);
+  }
+  return last - first > kSameLight_s;
+}
+
 /// Pictures are in the photographs' own response; high dynamic range goes through sRGB.
 Response picture_response(const Input& input, const Scene& scene) {
   return scene.exposure == 1 && input.response ? *input.response : Response{};
@@ -157,16 +195,32 @@ class Run {
     protect_sources(invocation_.output, sources());
     const OutputFolder folder(invocation_.output);
     for (const std::string& warning : input_.dataset.warnings) warn(options_.common, warning);
+    if (options_.reconstruct.memory)
+      require_memory(input_.dataset, lay_out(input_.dataset, input_.load, options_.reconstruct),
+                     options_.reconstruct, session_.context().thread_count());
+    sweep_leftovers(folder.path());
     if (std::filesystem::exists(folder.path() / "summary.json")) partial_.emplace(folder.path());
     const std::filesystem::path& results = partial_ ? partial_->path() : folder.path();
+    run_ = folder.path();
+    results_ = results;
     hashes_ = hash_images(input_.dataset, session_.context());
     stopwatch_.lap();
-    find_daylight(results);
-    make_volume(initial ? &initial->volume : nullptr);
-    if (initial && initial->info.exposure != made_.scene.exposure)
-      warn(options_.common,
-           "--init: that run has another exposure, so its colours are brighter or darker than here");
-    write_results(folder.path(), results);
+    RunCheckpoints checkpoints(folder.path(), options_.checkpoints, options_.common, made_from());
+    Checkpoint* const resume = checkpoints.find();
+    if (resume) seconds_before_ = resume->summary.seconds;
+    try {
+      find_daylight(results);
+      make_volume(initial ? &initial->volume : nullptr, resume, checkpoints);
+      if (initial && initial->info.exposure != made_.scene.exposure)
+        warn(options_.common,
+             "--init: that run has another exposure, so its colours are brighter or darker than here");
+      write_results(folder.path(), results);
+    } catch (...) {
+      session_.display().clear();
+      checkpoints.say_how_to_resume();
+      throw;
+    }
+    checkpoints.remove();
     return 0;
   }
 
@@ -189,22 +243,137 @@ class Run {
   /// The skies, where they are given or asked for; from then on the photographs come with sky masks.
   void find_daylight(const std::filesystem::path& results) {
     const IlluminationChoice choice = options_.reconstruct.illumination;
-    std::filesystem::path skies = options_.stages.sky.value_or("");
-    if (skies.empty() && choice == IlluminationChoice::kSky) {
-      const SkyInput input = read_sky_input(invocation_.inputs.front(), options_.input, {}, session_);
-      skies_ = fit_skies(input, {}, results, session_, input_.dataset.warnings);
-      add_stage("sky");
-      skies = results;
-    }
-    if (skies.empty()) return;
+    const bool wanted = choice == IlluminationChoice::kSky || choice == IlluminationChoice::kSkyNormal;
+    const bool likely = choice == IlluminationChoice::kAuto && several_times_of_day(input_.dataset);
+    const bool fitted = !options_.stages.sky && (wanted || likely);
+    check_sky_options(fitted);
+    if (fitted && !find_skies(results, wanted)) return;
+    if (!fitted && !options_.stages.sky) return;
+    const std::filesystem::path skies = fitted ? results : std::filesystem::path(*options_.stages.sky);
     daylight_ = read_daylight(skies, input_.dataset);
     if (daylight_->masks) input_.load = with_sky_masks(input_.load, skies);
+    if (fitted && options_.stages.sky_again && options_.reconstruct.levels > 1) {
+      doubt_ = std::make_shared<std::atomic<bool>>(true);
+      input_.load = with_doubt(input_.load, up(), doubt_);
+    }
   }
 
-  void make_volume(const Volume* initial) {
+  /// What says how skies are fitted does nothing where none is.
+  void check_sky_options(bool fitted) const {
+    if (fitted) return;
+    const char* idle = options_.stages.sun ? "--sun" : options_.stages.sky_masks ? "--sky-masks" : nullptr;
+    if (idle)
+      throw_invalid(idle, "no sky that is fitted in this run",
+                    "--illumination sky or sky-normal, without --sky RUN");
+  }
+
+  SkyOptions sky_options() const {
+    SkyOptions options;
+    options.sun = options_.stages.sun;
+    options.sky_masks = options_.stages.sky_masks;
+    sky_option_table().validate(options);
+    return options;
+  }
+
+  /// Fits the skies. Where they were not asked for, half of the photographs must turn out to have one.
+  bool find_skies(const std::filesystem::path& results, bool wanted) {
+    sky_input_ = read_sky_input(invocation_.inputs.front(), options_.input, sky_options(), session_);
+    skies_ = fit_skies(*sky_input_, sky_options(), results, session_, input_.dataset.warnings);
+    add_stage("sky");
+    std::size_t lit = 0;
+    for (const auto& node : skies_)
+      if (node.value("model", "none") != "none") lit += node.value("images", std::size_t{0});
+    const bool found = wanted || 2 * lit >= input_.dataset.views.size();
+    if (!wanted)
+      input_.dataset.notes.push_back("light: photographs of several times of day, of which " +
+                                     std::to_string(lit) + " of " +
+                                     std::to_string(input_.dataset.views.size()) +
+                                     (found ? " have a sky" : " have a sky: too few to divide it out"));
+    if (found) return true;
+    skies_.clear();
+    std::filesystem::remove_all(results / "sky");
+    return false;
+  }
+
+  Eigen::Vector3d up() const {
+    return sky_input_->tasks.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
+                                     : Eigen::Vector3d(sky_input_->tasks.front().sky_from_world.transpose() *
+                                                       Eigen::Vector3d::UnitZ());
+  }
+
+  /// Skies again, with what a first volume leaves unexplained. From here on masks are not doubted.
+  std::optional<Daylight> look_at_skies_again(const Volume& volume, const Scene& scene,
+                                              RunCheckpoints& checkpoints) {
+    *doubt_ = false;
+    const OpenRays open = open_rays(volume, input_.dataset, scene, up(), session_.context());
+    for (const SkyAgain& again :
+         fit_skies_again(*sky_input_, sky_options(), open, results_, session_, skies_))
+      skies_again_.push_back(to_json(again));
+    try {
+      if (options_.checkpoints.checkpoints)
+        keep_for_resume(run_, results_, {{"skies", skies_}, {"again", skies_again_}});
+    } catch (const IoError& error) {
+      checkpoints.give_up(error.what());  // later ones would be of no use without these skies
+    }
+    return read_daylight(results_, input_.dataset);
+  }
+
+  /// What look_at_skies_again found before the run was interrupted.
+  Daylight recall_skies() {
+    *doubt_ = false;
+    const nlohmann::ordered_json kept = recall_for_resume(run_, results_);
+    skies_ = kept.at("skies").get<std::vector<nlohmann::ordered_json>>();
+    skies_again_ = kept.at("again").get<std::vector<nlohmann::ordered_json>>();
+    return read_daylight(results_, input_.dataset);
+  }
+
+  /// Of what a volume depends on beside images and cameras.
+  std::string hash_beside_images() const {
+    ContentHash hash;
+    for (const View& view : input_.dataset.views) {
+      hash.update(view.mask_path.empty() ? "" : hash_file(view.mask_path));
+      hash.update(formatted(" %d %.17g %.17g %.17g", view.node_idx, view.time_utc_s.value_or(0),
+                            view.latitude_deg.value_or(0), view.longitude_deg.value_or(0)));
+      hash.update(formatted(" %.17g %.17g", view.near.value_or(-1), view.far.value_or(-1)));
+    }
+    const auto add = [&](const Eigen::Vector3d& x) {
+      hash.update(formatted(" %.17g %.17g %.17g", x.x(), x.y(), x.z()));
+    };
+    for (const Eigen::Vector3d& point : input_.dataset.points) add(point);
+    if (const auto& box = input_.dataset.scene_bounds) add(box->min()), add(box->max());
+    return hash.hex();
+  }
+
+  /// What a volume depends on: a checkpoint of anything else is not gone on from.
+  nlohmann::ordered_json made_from() const {
+    std::string dataset_hash;
+    for (std::size_t v = 0; v < hashes_.size(); ++v)
+      add_to_hash(input_.dataset.views[v], hashes_[v], dataset_hash);
+    nlohmann::ordered_json options = reconstruct_option_table().to_json(options_.reconstruct);
+    options.erase("memory");  // no result depends on it
+    options.update(input_option_table().to_json(options_.input));
+    const nlohmann::ordered_json stages = stage_table().to_json(options_.stages);
+    for (const char* name : {"init", "sky", "sun", "sky-masks", "sky-again"}) options[name] = stages.at(name);
+    const std::filesystem::path sky = options_.stages.sky.value_or("");
+    return {{"version", ROXEL_VERSION},
+            {"dataset_hash", dataset_hash},
+            {"masks_nodes_times_and_points_hash", hash_beside_images()},
+            {"sky_hash", sky.empty() ? "" : hash_folder(sky / "sky")},
+            {"sky_masks_hash", hash_folder(options_.stages.sky_masks.value_or(""))},
+            {"options", std::move(options)}};
+  }
+
+  void make_volume(const Volume* initial, Checkpoint* resume, RunCheckpoints& checkpoints) {
     ReconstructHooks hooks;
     hooks.initial = initial;
+    hooks.resume = resume;
+    hooks.checkpoint = [&](const CheckpointView& checkpoint) { checkpoints.offer(checkpoint); };
     if (daylight_) hooks.daylight = &*daylight_;
+    if (doubt_)
+      hooks.look_at_skies_again = [&](const Volume& volume, const Scene& scene) {
+        return look_at_skies_again(volume, scene, checkpoints);
+      };
+    if (doubt_) hooks.recall_skies = [&] { return recall_skies(); };
     hooks.after_survey = [&](const Scene& scene) {
       for (const std::string& warning : scene.warnings) warn(options_.common, warning);
     };
@@ -270,7 +439,8 @@ class Run {
                                   {results, results}, options_.depth, session_.context(), kViewsWritten,
                                   kDepthRefined);
     for (const StageRecord& record : stage_records(*refined_)) made_.summary.stages.push_back(record);
-    for (ReportView& view : report_views_) add_refined_pictures(results, made_.scene.voxel_size, view);
+    for (ReportView& view : report_views_)
+      add_refined_pictures(read_depth(depth_path(results, view.name)), made_.scene.voxel_size, view);
     stopwatch_.lap();
   }
 
@@ -310,7 +480,7 @@ class Run {
   }
 
   nlohmann::ordered_json summary_so_far() {
-    made_.summary.seconds = stopwatch_.total();
+    made_.summary.seconds = seconds_before_ + stopwatch_.total();
     made_.summary.peak_memory_bytes = peak_memory_bytes();
     nlohmann::ordered_json json = to_json(make_record(session_.context().thread_count()));
     if (refined_) json["depth"] = to_json(*refined_);
@@ -353,6 +523,7 @@ class Run {
     record.frame = made_.volume.index(0).frame();
     record.summary = made_.summary;
     record.skies = skies_;
+    record.skies_again = skies_again_;
     record.warnings = input_.dataset.warnings;
     record.warnings.insert(record.warnings.end(), made_.scene.warnings.begin(), made_.scene.warnings.end());
     record.views = views_;
@@ -391,7 +562,12 @@ class Run {
   Stopwatch stopwatch_;
   std::optional<PartialResults> partial_;
   std::optional<Daylight> daylight_;
-  std::vector<nlohmann::ordered_json> skies_;
+  std::vector<nlohmann::ordered_json> skies_, skies_again_;
+  std::optional<SkyInput> sky_input_;         ///< of skies that are fitted in this run
+  std::shared_ptr<std::atomic<bool>> doubt_;  ///< whether sky masks may lack sky; null: never
+  double seconds_before_ = 0;                 ///< of the parts before this one, of a run that is resumed
+  std::filesystem::path run_;
+  std::filesystem::path results_;
   Reconstruction made_;
   std::vector<ViewFigures> views_;
   std::vector<ReportView> report_views_;

@@ -13,8 +13,6 @@
 namespace roxel::cli {
 namespace {
 
-constexpr Response kAsItIs{ResponseCurve::kLinear};
-
 struct RenderCommandOptions {
   std::optional<std::string> cameras;
   std::optional<std::array<double, 3>> background_color;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "command.h"
+#include "common.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
@@ -16,6 +17,7 @@
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
 #include "roxel/report/sky_pictures.h"
+#include "sky_again.h"
 #include "sky_stage.h"
 
 namespace roxel::cli {
@@ -23,8 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-
-constexpr Response kAsItIs{ResponseCurve::kLinear};
 
 struct SkyCommandOptions {
   InputOptions input;
@@ -159,25 +159,38 @@ ReportView write_pictures(const fs::path& run, const SkyFit& fit) {
   return sky_report(fit, panels);
 }
 
-/// A mask by hand stands; the others come from the fit. Returns the share of pixels that are sky.
-double write_masks(const fs::path& run, const SkyFit& fit, const SkyPictureSource& pictures) {
-  double sky = 0, all = 0;
+/// A mask by hand stands; the others come from the fit.
+std::vector<Mask> make_masks(const SkyFit& fit, const SkyPictureSource& pictures) {
+  std::vector<Mask> masks;
   for (std::size_t i = 0; i < fit.sky.views.size(); ++i) {
-    const SkyPicture picture = pictures(static_cast<int>(i));
-    const Mask mask = picture.known_sky.empty() ? soft_sky_mask(picture, fit) : picture.known_sky;
-    write_png(sky_mask_path(run, fit.sky.views[i]).string(), mask);
-    for (const std::uint8_t value : mask.data()) sky += value / 255.0;
+    SkyPicture picture = pictures(static_cast<int>(i));
+    masks.push_back(picture.known_sky.empty() ? soft_sky_mask(picture, fit) : std::move(picture.known_sky));
+  }
+  return masks;
+}
+
+/// Share of the pixels that are 255.
+double mean_share(const std::vector<Mask>& masks) {
+  double sum = 0, all = 0;
+  for (const Mask& mask : masks) {
+    for (const std::uint8_t value : mask.data()) sum += value / 255.0;
     all += static_cast<double>(mask.data().size());
   }
-  return all > 0 ? sky / all : 0;
+  return all > 0 ? sum / all : 0;
+}
+
+void write_masks(const fs::path& run, const SkyFit& fit, const std::vector<Mask>& masks) {
+  for (std::size_t i = 0; i < masks.size(); ++i)
+    write_png(sky_mask_path(run, fit.sky.views[i]).string(), masks[i]);
 }
 
 NodeReport do_node(const SkyTask& task, const SkyPictureSource& pictures, const SkyCommandOptions& options,
                    const fs::path& run) {
   const SkyFit fit = fit_sky(task, pictures, options.sky.fit_options());
   write_sky(run, fit.sky);
-  const double mask_share = write_masks(run, fit, pictures);
-  NodeReport report{node_json(fit, mask_share), node_line(fit), {}, {}};
+  const std::vector<Mask> masks = make_masks(fit, pictures);
+  write_masks(run, fit, masks);
+  NodeReport report{node_json(fit, mean_share(masks)), node_line(fit), {}, {}};
   if (options.pictures) report.view = write_pictures(run, fit);
   for (const std::string& warning : fit.warnings) report.warnings.push_back(task.name + ": " + warning);
   return report;
@@ -236,7 +249,7 @@ void check_output(const fs::path& run) {
     throw_invalid("-o " + run.string(), "a reconstruction", "another folder: its summary.json would be lost");
 }
 
-void remove_older(const fs::path& run) {
+void remove_older_sky(const fs::path& run) {
   std::error_code ignored;
   if (!fs::is_regular_file(run / "summary.json")) return;
   fs::remove(run / "summary.json", ignored);
@@ -267,7 +280,7 @@ int run_sky(const Invocation& invocation, const SkyCommandOptions& options) {
       summary_json(invocation, input, ordered_json(sky_table().to_json(options)), reports, seconds);
   write_text_atomically(partial.path() / "summary.json", json_text(summary));
   if (options.pictures) write_text_atomically(partial.path() / "report.html", report_page(summary, reports));
-  partial.publish([&] { remove_older(folder.path()); });
+  partial.publish([&] { remove_older_sky(folder.path()); });
   session.display().clear();
   for (const auto& warning : summary["warnings"]) warn(options.common, warning.get<std::string>());
   print_result(options.common, text_of(input, reports, invocation.output), json_text(summary));
@@ -286,6 +299,46 @@ std::vector<ordered_json> fit_skies(const SkyInput& input, const SkyOptions& sky
     for (std::string& warning : report.warnings) warnings.push_back(std::move(warning));
   }
   return nodes;
+}
+
+namespace {
+
+/// The pictures of a node with what a volume lets through.
+SkyPictureSource with_open_rays(const SkyTask& task, const SkyPictureSource& pictures, const OpenRays& open) {
+  return [&](int i) {
+    SkyPicture picture = pictures(i);
+    if (const auto found = open.find(task.views[i]); found != open.end()) picture.open = found->second;
+    return picture;
+  };
+}
+
+}  // namespace
+
+std::vector<SkyAgain> fit_skies_again(const SkyInput& input, const SkyOptions& sky, const OpenRays& open,
+                                      const fs::path& run, Session& session,
+                                      std::vector<ordered_json>& nodes) {
+  constexpr double kMoreSky = 0.002;  ///< of a node's pixels: less is not worth another light
+  const SkyFitOptions options = sky.fit_options();
+  std::vector<SkyAgain> all(input.tasks.size());
+  parallel_for(
+      static_cast<std::int64_t>(all.size()), session.context().thread_count(), [&](std::int64_t n, int) {
+        session.context().throw_if_cancelled();
+        const SkyPictureSource pictures = with_open_rays(input.tasks[n], input.pictures[n], open);
+        const SkyFit fit = fit_sky(input.tasks[n], pictures, options);
+        const std::vector<Mask> masks = make_masks(fit, pictures);
+        std::vector<Mask> unexplained;
+        for (const std::string& view : input.tasks[n].views)
+          if (const auto found = open.find(view); found != open.end()) unexplained.push_back(found->second);
+        all[n] = {input.tasks[n].name, mean_share(unexplained),           nodes[n].value("mask_share", 0.0),
+                  mean_share(masks),   nodes[n].value("mean_error", 0.0), fit.sky.mean_error};
+        SkyAgain& again = all[n];
+        again.taken = fit.sky.has_light() && again.mask_share > again.mask_share_before + kMoreSky;
+        if (!again.taken) return;
+        write_sky(run, fit.sky);
+        write_masks(run, fit, masks);
+        nodes[n] = node_json(fit, again.mask_share);
+      });
+  return all;
 }
 
 void add_sky(Commands& commands) {

@@ -181,7 +181,7 @@ void remove_named(const fs::path& folder, const nlohmann::json& name) {
 }
 
 /// Files of an older synthetic data set, so that none is left over beside the new one.
-void remove_older(const fs::path& folder) {
+void remove_older_data_set(const fs::path& folder) {
   const nlohmann::json older = older_data_set(folder);
   std::ifstream in(folder / "illumination.json");
   const nlohmann::json light = in ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
@@ -216,7 +216,7 @@ int run_demo(const Invocation& invocation, const CommandOptions& options, const 
   if (options.background == BackgroundChoice::kSky) world.background = DemoBackground::kSky;
   PartialResults results(folder);
   write_demo_world(results.path(), world, {write_picture, write_grey, write_depth}, session.context());
-  results.publish([&] { remove_older(folder); });
+  results.publish([&] { remove_older_data_set(folder); });
   session.display().clear();
   print_made(invocation, options,
              std::to_string(world.images) + " photographs with cameras, masks and true depth",
@@ -250,7 +250,7 @@ int run_synth(const Invocation& invocation, const CommandOptions& given) {
   const WorldWriters writers{write_picture, write_grey, write_radiance, write_depth};
   PartialResults results(folder.path());
   const SynthSummary made = write_world(results.path(), *world, options.world, writers, session.context());
-  results.publish([&] { remove_older(folder.path()); });
+  results.publish([&] { remove_older_data_set(folder.path()); });
   session.display().clear();
   print_made(
       invocation, options,

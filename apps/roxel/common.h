@@ -15,6 +15,11 @@
 
 namespace roxel::cli {
 
+/// Of pictures, whose values are neither encoded nor decoded when they are written and read.
+inline constexpr Response kAsItIs{ResponseCurve::kLinear};
+/// Opacity above which a pixel's depth counts.
+inline constexpr float kHasDepth = 0.5f;
+
 struct CommonOptions {
   std::optional<int> threads;
   bool quiet = false;

@@ -1,4 +1,5 @@
 #include "dense_workspace.h"
+#include "common.h"
 
 #include <atomic>
 
@@ -16,7 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Response kAsItIs{ResponseCurve::kLinear};
 constexpr int kStride = 8;             ///< pixels between those that become points
 constexpr double kSameSurface = 0.02;  ///< relative difference of depth
 

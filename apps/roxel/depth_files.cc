@@ -1,4 +1,5 @@
 #include "depth_files.h"
+#include "common.h"
 
 #include <nlohmann/json.hpp>
 
@@ -15,7 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr Response kAsItIs{ResponseCurve::kLinear};
 constexpr std::array<const char*, 3> kPlaneChannels{"W", "W.u", "W.v"};
 
 /// Planes between the stage's passes: files of a folder that goes in the end.
@@ -150,12 +150,12 @@ ordered_json to_json(const DepthStageFigures& figures) {
         {"pixels", figures.refined_pixels},
         {"matched_pixels", figures.matched_pixels},
         {"agreed_pixels", figures.agreed_pixels},
+        {"scale", figures.refine_scale},
         {"seconds_per_megapixel", figures.pixels > 0 ? 1e6 * figures.refine_seconds / figures.pixels : 0}};
   return json;
 }
 
-void add_refined_pictures(const fs::path& run, double voxel_size, ReportView& view) {
-  const DepthLayers layers = read_depth(depth_path(run, view.name));
+void add_refined_pictures(const DepthLayers& layers, double voxel_size, ReportView& view) {
   const auto add = [&](const std::string& method, const Image& depth, const Image& variance) {
     if (depth.empty()) return;
     view.pictures.push_back(report_picture(

@@ -26,7 +26,7 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
 nlohmann::ordered_json to_json(const DepthStageFigures& figures);
 
 /// Adds to a page's view what its file says of the refined depth, if anything.
-void add_refined_pictures(const std::filesystem::path& run, double voxel_size, ReportView& view);
+void add_refined_pictures(const DepthLayers& layers, double voxel_size, ReportView& view);
 
 /// The stages that it was, with their times.
 std::vector<StageRecord> stage_records(const DepthStageFigures& figures);

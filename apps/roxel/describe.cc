@@ -1,10 +1,13 @@
 #include "describe.h"
 
+#include <cmath>
+#include <limits>
 #include <map>
 
 #include "progress_display.h"
 #include "roxel/base/formatted.h"
 #include "roxel/dataset/box_visibility.h"
+#include "roxel/depth/scaled_view.h"
 #include "roxel/solve/estimate.h"
 
 namespace roxel::cli {
@@ -30,6 +33,10 @@ Scene preview_scene(const Input& input, const ReconstructOptions& options, RunCo
   ReconstructOptions with_box = options;
   const Eigen::Vector3d low = scene.bounds.box.min(), high = scene.bounds.box.max();
   with_box.bounds = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+  if (options.illumination == IlluminationChoice::kSky ||
+      options.illumination == IlluminationChoice::kSkyNormal)
+    with_box.illumination = IlluminationChoice::kNone;               // skies are fitted when the run begins
+  with_box.memory = std::numeric_limits<double>::max() / kGibibyte;  // of all images it is asked below
   const Scene surveyed = survey(few, input.load, with_box, context);
   scene.background = surveyed.background;
   scene.exposure = surveyed.exposure;
@@ -75,6 +82,13 @@ std::string memory_text(double bytes) {
                                  : formatted("%.1f GiB", bytes / kGibibyte);
 }
 
+std::string memory_row(const MemoryPlan& plan) {
+  std::string text = "about " + memory_text(plan.peak_bytes);
+  if (std::isfinite(plan.sample_bytes))
+    text += ", where all but " + memory_text(plan.sample_bytes) + " of samples are made anew in each pass";
+  return text;
+}
+
 /// "  label      value" with the values in one column.
 std::string row(const std::string& label, const std::string& value) {
   std::string text = "  " + label;
@@ -82,9 +96,9 @@ std::string row(const std::string& label, const std::string& value) {
   return text + value + "\n";
 }
 
-/// Belief propagation, refinement, fusion and texture of a pixel that shows the object, on one core; measured
-/// on synthetic heads. Others cost next to nothing.
-constexpr double kDepthSecondsPerPixel = 40e-6;
+/// Of a pixel that shows the object, on one core, measured on synthetic heads: belief propagation, fusion and
+/// texture; and refinement, of a pixel as it sees them. Others cost next to nothing.
+constexpr double kSurfaceSecondsPerPixel = 15e-6, kRefineSecondsPerPixel = 25e-6;
 
 double count_pixels(const Dataset& dataset) {
   double pixels = 0;
@@ -101,9 +115,14 @@ Description describe(const Input& input, const ReconstructOptions& options, RunC
   const Eigen::Vector3i voxels = nested_frames(scene.bounds.box, scene.voxel_size, 0)[0].size_in_voxels();
   const BoxVisibility seen = box_visibility(dataset, scene.bounds, scene.voxel_size);
   const CostEstimate cost = estimate_cost(dataset, scene, options, context.thread_count());
-  const double depth_seconds = kDepthSecondsPerPixel * count_pixels(dataset) / context.thread_count();
+  const int refine_scale = choose_scale({seen.median_pixels_per_voxel});
+  const double depth_seconds =
+      (kSurfaceSecondsPerPixel + kRefineSecondsPerPixel / (refine_scale * refine_scale)) *
+      count_pixels(dataset) / context.thread_count();
   std::vector<std::string> warnings = dataset.warnings;
   warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
+  if (!cost.memory.fits)
+    warnings.push_back("memory: " + memory_shortage(dataset, scene, options, context.thread_count()));
   std::vector<std::string> notes = dataset.notes;
   notes.insert(notes.end(), scene.notes.begin(), scene.notes.end());
   const int masks = count_masks(dataset), lenses = count_lenses(dataset);
@@ -127,7 +146,7 @@ Description describe(const Input& input, const ReconstructOptions& options, RunC
                                            seen.median_pixels_per_voxel, seen.views,
                                            seen.min_pixels_per_voxel, seen.max_pixels_per_voxel));
   out.text += row("seen twice", formatted("%.0f %% of the box", 100 * seen.share_seen_twice));
-  out.text += row("memory", "about " + memory_text(cost.memory_bytes));
+  out.text += row("memory", memory_row(cost.memory));
   out.text += row(
       "time", "about " + duration_text(cost.seconds) + formatted(" on %d threads", context.thread_count()));
   out.text += row("", "and up to " + duration_text(depth_seconds) +
@@ -164,7 +183,9 @@ Description describe(const Input& input, const ReconstructOptions& options, RunC
               {"views_of_box", seen.views},
               {"share_seen_twice", seen.share_seen_twice},
               {"estimate",
-               {{"memory_bytes", cost.memory_bytes},
+               {{"memory_bytes", cost.memory.peak_bytes},
+                {"memory_limit_bytes", cost.memory.limit_bytes},
+                {"memory_fits", cost.memory.fits},
                 {"seconds", cost.seconds},
                 {"depth_seconds", depth_seconds},
                 {"threads", context.thread_count()},

@@ -1,8 +1,10 @@
 #include "eval_measure.h"
+#include "common.h"
 
 #include <cmath>
 #include <limits>
 
+#include "eval_light.h"
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 #include "roxel/eval/depth_points.h"
@@ -21,9 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Response kAsItIs{ResponseCurve::kLinear};
-constexpr float kHasDepth = 0.5f;     ///< opacity above which a pixel's depth counts
-constexpr float kConfident = 0.001f;  ///< below it no photograph has seen a voxel
 constexpr std::size_t kMostColorPixels = 2000000;
 
 /// One view as far as its files are there.
@@ -94,6 +93,7 @@ class Measurement {
     out_.voxel_size = source_.voxel_size();
     out_.box = source_.box;
     out_.opacity_threshold = options_.opacity_threshold;
+    out_.confidence_threshold = options_.confidence_threshold;
     out_.notes = source_.notes;
     const nlohmann::json& summary = source_.run.summary;
     if (const auto rms = summary.find("reprojection_rms_percent"); rms != summary.end() && rms->is_number())
@@ -273,8 +273,8 @@ class Measurement {
     }
     if (!refined_.empty())
       add_points("refined depth points", one_point_a_cell(depth_points(refined_, {}, threads_), cell));
-    saved_ =
-        saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold), kConfident);
+    saved_ = saved_voxels(source_.run.file.volume, static_cast<float>(options_.opacity_threshold),
+                          static_cast<float>(options_.confidence_threshold));
     add_points("voxels", saved_.centres);
     if (source_.run_mesh) add_mesh("mesh", *source_.run_mesh);
     if (source_.estimate) add_mesh(source_.estimate_name, *source_.estimate);
@@ -382,6 +382,9 @@ class Measurement {
   }
 
   void measure_light() {
+    TrueDepths depths;
+    for (const std::string& name : source_.view_names) depths.push_back(true_depth_of(source_, name));
+    out_.light = cli::measure_light(source_, depths, session_);
     if (source_.truth && has_sky_truth(*source_.truth) && fs::is_directory(source_.run.path / "sky"))
       out_.skies = measure_skies(source_.run.path, *source_.truth, threads_);
   }

@@ -10,8 +10,9 @@ struct MeasureOptions {
   std::vector<double> depth_within;  ///< world units
   std::vector<double> distances;     ///< of precision and recall, world units; empty: see default_distances
   double opacity_threshold = 0.04;   ///< of voxels that count as saved
-  int views_agree = 2;               ///< for the second set of depth points
-  int samples = 200000;              ///< of the true surface
+  double confidence_threshold = 0.001;  ///< of these, too
+  int views_agree = 2;                  ///< for the second set of depth points
+  int samples = 200000;                 ///< of the true surface
   std::uint64_t seed = 1;
   std::optional<std::array<double, 3>> section;  ///< point that the sections go through
 };

@@ -1,5 +1,7 @@
 #include "mesh_stage.h"
+#include "common.h"
 
+#include <Eigen/Eigenvalues>
 #include <chrono>
 
 #include "roxel/base/atomic_file.h"
@@ -24,10 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr Response kAsItIs{ResponseCurve::kLinear};
-constexpr float kHasDepth = 0.5f;  ///< opacity above which a pixel's depth counts
-constexpr int kTurns = 24;         ///< pictures of a turntable
-constexpr int kTurnSize = 240;     ///< pixels
+constexpr int kTurnSize = 240;          ///< pixels
+constexpr double kOnTheirSides = 1.02;  ///< how much more alike photographs are in what is right than up
 constexpr int kShownViews = 4;
 constexpr int kShownWidth = 480;
 
@@ -163,12 +163,14 @@ class MeshStage {
     if (options_.faces && *options_.faces > extracted)
       out_.warnings.push_back("--faces " + std::to_string(*options_.faces) + ": the surface has only " +
                               std::to_string(extracted) + " triangles; all are kept");
+    // Of all triangles, which are small and regular; those that are left include slivers, whose normals are
+    // anything. Points that stay keep theirs.
+    surface_.normals = point_normals(surface_.mesh);
     try {
       surface_ = simplified(surface_, {options_.faces, options_.error * voxel_size_});
     } catch (const InvalidInput& error) {
       throw InvalidInput("--faces: " + std::string(error.what()));
     }
-    surface_.normals = point_normals(surface_.mesh);
     out_.figures["triangles"] = surface_.mesh.triangles.size();
     out_.figures["points"] = surface_.mesh.points.size();
     lap("mesh: simplification", 0.3);
@@ -262,17 +264,31 @@ class MeshStage {
     out_.text += "\n";
   }
 
-  /// The mean of what is up in the photographs, or z.
-  Eigen::Vector3d up() const {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const View& view : input_.dataset.views) sum -= view.camera.pose.rotation.row(1).transpose();
-    return sum.norm() > 1e-3 ? sum.normalized() : Eigen::Vector3d::UnitZ();
+  /// The mean of what is up in the photographs. Where they were taken on their sides, what is up in them
+  /// turns with the way around, and the line to their right stays: then up is that, towards the cameras.
+  Eigen::Vector3d up(const Eigen::Vector3d& middle) const {
+    Eigen::Vector3d up = Eigen::Vector3d::Zero(), to_cameras = up;
+    Eigen::Matrix3d ups = Eigen::Matrix3d::Zero(), rights = ups;
+    for (const View& view : input_.dataset.views) {
+      const Eigen::Vector3d own = -view.camera.pose.rotation.row(1).transpose(),
+                            right = view.camera.pose.rotation.row(0).transpose();
+      up += own;
+      ups += own * own.transpose();
+      rights += right * right.transpose();
+      to_cameras += view.camera.pose.centre - middle;
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> of_ups(ups), of_rights(rights);
+    if (of_rights.eigenvalues()[2] > kOnTheirSides * of_ups.eigenvalues()[2]) {
+      const Eigen::Vector3d right = of_rights.eigenvectors().col(2);
+      return right.dot(to_cameras) < 0 ? -right : right;
+    }
+    return up.norm() > 1e-3 ? up.normalized() : Eigen::Vector3d::UnitZ();
   }
 
   Image turntable(const Surface& surface, const MeshRays& rays, const HitColor& color) const {
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& x : surface.mesh.points) box.extend(x);
-    const Eigen::Vector3d axis = up();
+    const Eigen::Vector3d axis = up(box.center());
     Eigen::Vector3d start = input_.dataset.views.front().camera.pose.centre - box.center();
     start -= start.dot(axis) * axis;
     start = start.norm() > 1e-6 ? start.normalized() : axis.unitOrthogonal();

@@ -52,6 +52,9 @@ struct MeshResult {
   ReportMesh pictures;
 };
 
+inline constexpr int kTurns = 24;            ///< pictures of a turntable, side by side
+inline constexpr int kMeshSheetWidth = 980;  ///< of mesh_views.png, pixels
+
 /// The files of a mesh in the folder of a run, whether they are there or not.
 std::vector<std::string> mesh_files();
 

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Folders below an output that commands write into.
-constexpr const char* kResultFolders[] = {"depth",  "render", "error",  "opacity",
+constexpr const char* kResultFolders[] = {"depth",  "render", "error",  "light", "opacity",
                                           "images", "masks",  "sparse", "sky"};
 
 /// Absolute, without links. Twice, for "missing/../link": links after a part that does not exist stay.

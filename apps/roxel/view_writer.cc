@@ -1,4 +1,5 @@
 #include "view_writer.h"
+#include "common.h"
 
 #include <algorithm>
 
@@ -12,7 +13,6 @@ namespace {
 
 constexpr int kSheetRows = 4;
 constexpr int kThumbnailWidth = 400;
-constexpr Response kAsItIs{ResponseCurve::kLinear};
 
 bool in_overview(int view_idx, int count) {
   for (int row = 0; row < kSheetRows; ++row)
@@ -24,6 +24,16 @@ double share_opaque(const Image& opacity) {
   const auto opaque =
       std::count_if(opacity.data().begin(), opacity.data().end(), [](float a) { return a > 0.5f; });
   return static_cast<double>(opaque) / static_cast<double>(opacity.data().size());
+}
+
+/// The photograph without its light; black where that is not known.
+Image under_canonical_light(const ViewResult& result) {
+  Image rgb = result.photo.rgb;
+  for (std::size_t i = 0; i < rgb.data().size(); ++i) {
+    const float light = result.light.empty() ? result.view_light[i % 3] : result.light.data()[i];
+    rgb.data()[i] = light > 0 ? rgb.data()[i] / light : 0.0f;
+  }
+  return rgb;
 }
 
 /// The render's light in units of white, as image_error compares it.
@@ -81,6 +91,8 @@ void ViewWriter::write(const ViewResult& result) {
 ViewWriter::Pictures ViewWriter::make_pictures(const ViewResult& result) const {
   Pictures pictures;
   pictures.photo = encoded_picture(result.photo.rgb, white_, response_);
+  if (!result.light.empty() || result.view_light != std::array<float, 3>{1, 1, 1})
+    pictures.canonical = encoded_picture(under_canonical_light(result), white_, response_);
   if (!result.rendering.rgb.empty()) {
     pictures.render = encoded_picture(result.rendering.rgb, white_, response_);
     pictures.error =
@@ -102,6 +114,11 @@ void ViewWriter::write_files(const ViewResult& result, const std::string& name,
   put("depth", pictures.depth);
   put("render", pictures.render);
   put("error", pictures.error);
+  if (!result.light.empty()) {
+    write_exr(view_path(run_, "light", name, ".exr").string(), rgb_channels(result.light),
+              ExrPrecision::kHalf);
+    put("light", pictures.canonical);
+  }
 }
 
 void ViewWriter::keep_for_overview(int view_idx, const Pictures& pictures) {
@@ -123,6 +140,8 @@ ReportView ViewWriter::report_view(const ViewResult& result, const ViewFigures& 
     view.pictures.push_back(report_picture("render", pictures.render));
     view.pictures.push_back(report_picture("error", pictures.error));
   }
+  if (!pictures.canonical.empty())
+    view.pictures.push_back(report_picture("under canonical light", pictures.canonical));
   const DepthMap& map = result.depth;
   if (!map.depth.empty()) {
     view.pictures.push_back(report_picture("depth", pictures.depth));

@@ -38,6 +38,7 @@ class ViewWriter {
  private:
   struct Pictures {
     Image photo, render, depth, error;
+    Image canonical;  ///< the photograph under canonical light; empty where nothing is divided out
   };
   Pictures make_pictures(const ViewResult& result) const;
   void write_files(const ViewResult& result, const std::string& name, const Pictures& pictures) const;

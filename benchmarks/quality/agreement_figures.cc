@@ -21,9 +21,8 @@
 #include <vector>
 
 #include "color_panels.h"
+#include "matchers.h"
 #include "roxel/base/atomic_file.h"
-#include "roxel/color/color_gaussian.h"
-#include "roxel/color/color_space.h"
 #include "roxel/report/svg_plot.h"
 
 namespace {
@@ -32,57 +31,7 @@ using namespace roxel;
 namespace fs = std::filesystem;
 
 constexpr int kSteps = 100, kPairs = 50;
-constexpr double kExponentialNoises = 2.5;  // the scale of exponential agreement in `roxel reconstruct`
-constexpr float kLinearThreshold = 0.8f;    // the thesis does not print its own
-constexpr double kWideNoises = 4;           // figures 4.4 to 4.6 and 4.11: wide enough to be seen
-
-/// A patch of a photograph: colours and their shares of its pixels.
-using Patch = std::vector<std::pair<float, LinearRgb>>;
-
-/// One way of saying how well two patches agree.
-struct Matcher {
-  std::string name;
-  ColorTransform transform;
-  std::function<float(const ColorGaussian&, const ColorGaussian&)> agree;
-
-  /// Mean and covariance of a patch, eq. (4.3), (4.4), in the matcher's space.
-  ColorGaussian gaussian(const Patch& patch) const {
-    WeightedColor sum;
-    for (const auto& [share, color] : patch) {
-      const float rgb[3] = {static_cast<float>(color.r), static_cast<float>(color.g),
-                            static_cast<float>(color.b)};
-      WeightedColor part{{}, share};
-      transform.from_rgb(rgb, part.color.mean);
-      sum = merge(sum, part);
-    }
-    return sum.color;
-  }
-  float operator()(const Patch& a, const Patch& b) const { return agree(gaussian(a), gaussian(b)); }
-
-  /// How well the one colour agrees that agrees best: below 1 for mixed patches.
-  float best(const Patch& patch) const {
-    const ColorGaussian mixed = gaussian(patch);
-    ColorGaussian plain = mixed;
-    std::fill(std::begin(plain.cov), std::end(plain.cov), 0.0f);
-    return agree(mixed, plain);
-  }
-};
-
-Matcher gaussian_matcher(const std::string& name, ColorSpace space, double noises = 1) {
-  const float noise = static_cast<float>(noises * default_noise(space));
-  return {name, ColorTransform(space), GaussianAgreement(noise)};
-}
-
-std::vector<Matcher> matchers(double noises = 1) {
-  const ColorSpace stored = ColorSpace::kSrgb;
-  const float scale = static_cast<float>(kExponentialNoises * noises * default_noise(stored));
-  const float d_max = static_cast<float>(gamut_diameter(stored));
-  return {{"linear", ColorTransform(stored), LinearAgreement(d_max, kLinearThreshold)},
-          {"exponential", ColorTransform(stored), ExponentialAgreement(scale)},
-          gaussian_matcher("sRGB", stored, noises),
-          gaussian_matcher("Luv", ColorSpace::kLuv, noises),
-          gaussian_matcher("RGB", ColorSpace::kRgb, noises)};
-}
+constexpr double kWideNoises = 4;  // figures 4.4 to 4.6 and 4.11: wide enough to be seen
 
 LinearRgb mix(const LinearRgb& a, const LinearRgb& b, double share) {
   return {(1 - share) * a.r + share * b.r, (1 - share) * a.g + share * b.g, (1 - share) * a.b + share * b.b};

@@ -1,53 +1,96 @@
 #!/usr/bin/env python3
-"""The thesis's tables 8.1 and 8.2, reproduced on synthetic worlds, with its own figures beside ours.
+"""The thesis's tables 8.1 to 8.4, reproduced on synthetic worlds, with its own figures beside ours.
 
     tables.py [--roxel PROGRAM] [--work DIR] [--docs DIR] [--resolution N] [--only PATTERN] [--write-only]
 
 Makes each world with a fixed seed, reconstructs it with every choice of agreement, colour space and update
-rule, measures all at one opacity threshold, and writes tables.md and tables.csv. Runs that the work folder
-has already, made by the same command, are not made again.
+rule, measures all at the same two thresholds, and writes tables.md, tables.csv and pictures. Runs that the
+work folder has already, made by the same command, are not made again. The same for the data sets plane and head
+of ROXEL_TEST_DATA, where that is set: figures only.
 """
 
 import argparse
 import csv
+import dataclasses
 import fnmatch
 import json
 import math
+import os
 import pathlib
+import re
 import shlex
 import shutil
 import subprocess
 import sys
 import time
 
-WORLDS = {"plane": "a printed board", "head": "a head on a turntable", "mug": "a hollow mug on a turntable"}
 CHOICES = [("exponential", "rgb"), ("gaussian", "rgb"), ("gaussian", "luv"), ("exponential", "luv")]
 UPDATES = ["posterior", "roxels"]
+# The order that the thesis finds, best first.
+THESIS_ORDER = [("gaussian", "luv"), ("gaussian", "rgb"), ("exponential", "rgb")]
 SEED = 1
 OPACITY_THRESHOLD = 0.3
+CONFIDENCE_THRESHOLD = 0.05
 
-# [Jethwa04] tables 8.1 and 8.2: voxels, close to the truth (%), distance-weighted mean opacity (%).
-THESIS = {
-    "plane": {("exponential", "rgb"): (21928, 73.2, 27.1), ("gaussian", "rgb"): (35281, 81.4, 76.3),
-              ("gaussian", "luv"): (32223, 83.3, 77.0)},
-    "head": {("exponential", "rgb"): (127245, 40.2, 29.3), ("gaussian", "rgb"): (65890, 63.4, 57.7),
-             ("gaussian", "luv"): (62996, 64.2, 59.9)},
+
+@dataclasses.dataclass(frozen=True)
+class World:
+    """A part of the page: one world, or one way of treating its light."""
+    what: str
+    data: str = ""                 # the world that is made; empty: the part's own name
+    size: tuple = ()               # options that say how fine voxels are; empty: --resolution
+    light: tuple = ()              # further options of reconstruct; "SKY" is the folder of the world's skies
+    section: str = "section_x"
+    through: str = ""              # point of the sections; empty: the middle of the box
+    view: str = ""                 # image whose renders are shown; empty: none
+    updates: tuple = ("posterior", "roxels")
+    choices: tuple = tuple(CHOICES)
+    table: str = ""                # the thesis's
+    figures: str = ""              # of the thesis, which the pictures are like
+    thesis: tuple = ()             # its rows: choice -> voxels, close to the truth (%), weighted mean opacity (%)
+    shared: bool = False           # a data set of ROXEL_TEST_DATA
+
+
+STREET = {"data": "street", "size": ("--voxel-size", "1"), "section": "section_z", "through": "-1,0,5",
+          "view": "n03_04", "choices": tuple(THESIS_ORDER[::-1])}
+STREET_FIGURES = "8.20, 8.22, 8.27, 8.30 to 8.32"
+WORLDS = {
+    "plane": World("a printed board", view="007", table="Table 8.1", figures="8.3, 8.5, 8.6",
+                   thesis=((21928, 73.2, 27.1), (35281, 81.4, 76.3), (32223, 83.3, 77.0))),
+    "head": World("a head on a turntable", view="003", table="Table 8.2", figures="8.9, 8.11, 8.12",
+                  thesis=((127245, 40.2, 29.3), (65890, 63.4, 57.7), (62996, 64.2, 59.9))),
+    "mug": World("a hollow mug on a turntable", view="003", figures="8.16"),
+    "street": World("a street, its light as it is", light=("--illumination", "none", "--matching", "canonical"),
+                    table="Table 8.3", figures=STREET_FIGURES,
+                    thesis=((223721, 46.1, 25.3), (173755, 42.3, 26.2), (114488, 47.8, 39.5)), **STREET),
+    "street-sky": World("the street, adjusted for the light of each node's sky",
+                        light=("--illumination", "sky", "--matching", "canonical", "--sky", "SKY"),
+                        table="Table 8.4", figures=STREET_FIGURES,
+                        thesis=((212537, 45.2, 27.2), (118236, 40.6, 27.4), (116920, 47.3, 43.9)), **STREET),
+    "street-local": World("the street, adjusted, and compared without local light",
+                          light=("--illumination", "sky", "--matching", "local", "--sky", "SKY"),
+                          updates=("posterior",), **{**STREET, "choices": (("gaussian", "luv"),)}),
+    "shared-plane": World("the data set plane", data="plane", shared=True),
+    "shared-head": World("the data set head", data="head", shared=True),
 }
-THESIS_TABLE = {"plane": "Table 8.1", "head": "Table 8.2"}
+# The default choice once more at this resolution: nearer to the program's own of 256.
+FINE_RESOLUTION = 192
+FINE = ["plane", "head", "mug"]
 
 COLUMNS = [("voxels", "voxels"), ("close", "within 4 voxels %"), ("opacity", "weighted mean opacity %"),
            ("covered", "surface covered %"), ("rms", "RMS %"), ("depth_1", "depth within 1 voxel %"),
            ("depth_4", "depth within 4 voxels %"), ("f_score", "F at 1 % of the diagonal")]
-# The order that the thesis finds, best first.
-THESIS_ORDER = [("gaussian", "luv"), ("gaussian", "rgb"), ("exponential", "rgb")]
-# What the page shows of each run: a cross-section that eval draws, and its histogram of distances.
-PICTURES = {"plane": "section_x", "head": "section_x", "mug": "section_x"}
 HISTOGRAM = "voxel_distances"
-THESIS_PICTURES = {"plane": "8.5, 8.6", "head": "8.11, 8.12"}
+
+
+def thesis_rows(world):
+    """The thesis's rows of a world by choice, worst first as there."""
+    return dict(zip(THESIS_ORDER[::-1], WORLDS[world].thesis))
 
 
 def all_runs():
-    return [(world, update, *choice) for world in WORLDS for update in UPDATES for choice in CHOICES]
+    return [(name, update, *choice) for name, world in WORLDS.items() for update in world.updates
+            for choice in world.choices]
 
 
 def run_name(run):
@@ -59,9 +102,19 @@ def selected(pattern):
     return [run for run in all_runs() if not pattern or fnmatch.fnmatch(run_name(run), pattern)]
 
 
-def reconstruct_options(run, resolution):
-    _, update, agreement, space = run
-    return ["--update", update, "--agreement", agreement, "--color-space", space, "--resolution", str(resolution)]
+def reconstruct_options(run, resolution, sky="SKY"):
+    name, update, agreement, space = run
+    world = WORLDS[name]
+    return ["--update", update, "--agreement", agreement, "--color-space", space,
+            *(world.size or ("--resolution", str(resolution))),
+            *(str(sky) if option == "SKY" else option for option in world.light)]
+
+
+def shared_folder(name):
+    """A data set of ROXEL_TEST_DATA; None where that is not set, or without it."""
+    root = os.environ.get("ROXEL_TEST_DATA")
+    folder = pathlib.Path(root) / name if root else None
+    return folder if folder and folder.is_dir() else None
 
 
 def make(command, folder, done):
@@ -86,17 +139,35 @@ def one_percent_of_diagonal(dataset):
     return 0.01 * math.dist(low, high)
 
 
-def measure(run, options):
-    """The folder with a run's metrics, made where it is not there."""
-    roxel, work = str(options.roxel), options.work / str(options.resolution)
+def data_of(name, options):
+    """The data set of a part of the page and whether it has been made anew; None where it is not there."""
+    world = WORLDS[name]
+    if world.shared:
+        return shared_folder(world.data), False
+    data = options.work / (world.data or name)
+    return data, make([str(options.roxel), "synth", world.data or name, "-o", str(data), "--seed", str(SEED),
+                       "--quiet"], data, "transforms.json")
+
+
+def measure(run, options, resolution=None):
+    """The folder with a run's metrics, made where it is not there; None where its data are not."""
+    roxel, resolution = str(options.roxel), resolution or options.resolution
+    work, world = options.work / str(resolution), WORLDS[run[0]]
     work.mkdir(parents=True, exist_ok=True)
-    data, made, metrics = options.work / run[0], work / run_name(run), work / (run_name(run) + "-metrics")
-    anew = make([roxel, "synth", run[0], "-o", str(data), "--seed", str(SEED), "--quiet"], data, "transforms.json")
-    command = [roxel, "reconstruct", str(data), "-o", str(made), *reconstruct_options(run, options.resolution)]
+    data, anew = data_of(run[0], options)
+    if data is None:
+        return None
+    made, metrics = work / run_name(run), work / (run_name(run) + "-metrics")
+    sky = data.with_name(data.name + "-sky")
+    if "SKY" in world.light:
+        anew = make([roxel, "sky", str(data), "-o", str(sky), "--no-pictures", "--quiet"], sky, "summary.json") or anew
+    command = [roxel, "reconstruct", str(data), "-o", str(made), *reconstruct_options(run, resolution, sky)]
     if make([*command, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet"], made, "summary.json") or anew:
         shutil.rmtree(metrics, ignore_errors=True)
     make([roxel, "eval", str(made), "--truth", str(data), "-o", str(metrics), "--opacity-threshold",
-          str(OPACITY_THRESHOLD), "--distances", f"{one_percent_of_diagonal(data):.6g}", "--quiet"], metrics, "metrics.json")
+          str(OPACITY_THRESHOLD), "--confidence-threshold", str(CONFIDENCE_THRESHOLD), "--distances",
+          f"{one_percent_of_diagonal(data):.6g}", *(["--section=" + world.through] if world.through else []), "--quiet"],
+         metrics, "metrics.json")
     return metrics
 
 
@@ -144,12 +215,12 @@ def world_table(world, results):
     """One world's table: the thesis's rows first, then ours for each update rule."""
     lines = [row(["rule", "agreement"] + [title for _, title in COLUMNS]),
              row(["---", "---"] + ["---:"] * len(COLUMNS))]
-    for choice, known in THESIS.get(world, {}).items():
+    for choice, known in thesis_rows(world).items():
         values = dict(zip(["voxels", "close", "opacity"], known))
-        lines.append(row([f"thesis, {THESIS_TABLE[world]}", choice_name(choice)] +
+        lines.append(row([f"thesis, {WORLDS[world].table}", choice_name(choice)] +
                          [cell(key, values.get(key)) for key, _ in COLUMNS]))
-    for update in UPDATES:
-        for choice in CHOICES:
+    for update in WORLDS[world].updates:
+        for choice in WORLDS[world].choices:
             values = results.get((world, update, *choice))
             if values:
                 lines.append(row([f"ours, `{update}`", choice_name(choice)] +
@@ -159,21 +230,52 @@ def world_table(world, results):
 
 def pictures_of(run):
     """Pairs of a picture's file beside a run's metrics and its file beside the page."""
-    return [(f"{stem}.svg", f"{run_name(run)}-{stem}.svg") for stem in (PICTURES[run[0]], HISTOGRAM)]
+    return [(f"{stem}.svg", f"{run_name(run)}-{stem}.svg") for stem in (WORLDS[run[0]].section, HISTOGRAM)]
+
+
+SHORTEST = 0.5  # voxels
+
+
+def without_specks(svg):
+    """A section whose outline has no pieces shorter than SHORTEST: leaves of trees, which are most of its size."""
+    def kept(piece):
+        x0, y0, x1, y1 = (float(number) for number in piece.groups())
+        return piece.group() if math.hypot(x1 - x0, y1 - y0) >= SHORTEST else ""
+    return re.sub(r"M([\d.-]+) ([\d.-]+)L([\d.-]+) ([\d.-]+)(?=M|\")", kept, svg)
 
 
 def copy_pictures(results, folders, docs):
     for run in results:
-        if run[2:] in THESIS_ORDER:
+        if run[2:] in THESIS_ORDER and not WORLDS[run[0]].shared:
             for source, target in pictures_of(run):
-                shutil.copyfile(folders[run] / source, docs / target)
+                text = (folders[run] / source).read_text()
+                (docs / target).write_text(without_specks(text) if WORLDS[run[0]].data == "street" else text)
+
+
+def render_sheet(world, results, options):
+    """Renders of one view as JPEG beside the page: a row a rule, the photograph first. Returns whether it is there."""
+    name, view = f"{world}-renders.jpg", WORLDS[world].view
+    if not view or not options.sheets.exists():
+        return (options.docs / name).exists()
+    photo = next((str(p) for p in [(options.work / (WORLDS[world].data or world) / "images" / (view + suffix))
+                                   for suffix in (".png", ".exr")] if p.exists()), "-")
+    choices, files = THESIS_ORDER[::-1], []
+    for update in WORLDS[world].updates:
+        renders = [options.work / str(options.resolution) / run_name((world, update, *choice)) / "render" / (view + ".png")
+                   for choice in choices]
+        if any(path.exists() for path in renders):
+            files += [photo, *(str(path) if path.exists() else "-" for path in renders)]
+    if not files:
+        return False
+    subprocess.run([str(options.sheets), str(options.docs / name), str(1 + len(choices)), "240", *files], check=True)
+    return True
 
 
 def picture_table(world, results):
     """Sections and histograms, a column for each of the thesis's choices, worst first as there."""
     choices = THESIS_ORDER[::-1]
     lines = [row(["rule"] + [choice_name(choice) for choice in choices]), row(["---"] * (1 + len(choices)))]
-    for update in UPDATES:
+    for update in WORLDS[world].updates:
         for i in range(2):
             runs = [(world, update, *choice) for choice in choices]
             shown = [f"![{run_name(run)}]({pictures_of(run)[i][1]})" if run in results else "-" for run in runs]
@@ -203,32 +305,65 @@ def ordering_table(results):
             ("depth_1", "depth within 1 voxel"), ("f_score", "F at 1 %"), ("rms", "RMS (less is better)")]
     lines = [row(["world", "rule"] + [title for _, title in keys]), row(["---"] * (2 + len(keys)))]
     for world in WORLDS:
-        for update in UPDATES:
+        for update in WORLDS[world].updates:
             found = [ordering(world, update, key, results, key == "rms") for key, _ in keys]
             if None not in found:
                 lines.append(row([world, f"`{update}`", *found]))
     return lines
 
 
-def document(results, resolution, remarks=""):
-    lines = ["# Tables 8.1 and 8.2 of the thesis, reproduced", "",
-             "Made by `benchmarks/quality/tables.py`; do not edit: what is said by hand stands in "
-             "`benchmarks/quality/tables_remarks.md`. Figures as CSV: [tables.csv](tables.csv).", "",
-             "```sh", f"benchmarks/quality/tables.py --resolution {resolution}", "```", "",
-             f"Worlds: `roxel synth WORLD --seed {SEED}` with its other options at their defaults. Runs: "
-             f"`roxel reconstruct --resolution {resolution} --update RULE --agreement AGREEMENT --color-space SPACE`, all else "
-             "at its default, so masks are used and noise and scale are the space's own. Measured by `roxel eval "
-             f"--opacity-threshold {OPACITY_THRESHOLD}`: one threshold for all ([evaluation.md](../evaluation.md)). "
-             "*RMS* is over the object; *surface covered* is the share of what two views see that has a counted voxel "
-             "within one voxel; *F* is of the depth points at 1 % of the box's diagonal.", "",
-             "The thesis's rows are [Jethwa04] tables 8.1 and 8.2: other objects of the same kind, other cameras and another "
-             "size of voxels, so the numbers of voxels do not compare and the rest does so roughly. The thesis measures from the "
-             "nearest voxel of the true surface, `roxel eval` from the surface.", ""]
-    for world, what in WORLDS.items():
-        thesis = f", as figures {THESIS_PICTURES[world]} of the thesis" if world in THESIS_PICTURES else ""
-        lines += [f"## {world}: {what}", "", *world_table(world, results), "",
-                  f"Cross-sections (opacity in grey, the true outline in red) and voxels by distance{thesis}:", "",
-                  *picture_table(world, results), ""]
+def fine_table(fine):
+    lines = [row(["world"] + [title for _, title in COLUMNS]), row(["---"] + ["---:"] * len(COLUMNS))]
+    return lines + [row([world] + [cell(key, values[key]) for key, _ in COLUMNS]) for world, values in fine.items()]
+
+
+HEAD = """# Tables 8.1 to 8.4 of the thesis, reproduced
+
+Made by `benchmarks/quality/tables.py`; do not edit: what is said by hand stands in `benchmarks/quality/tables_remarks.md`. Figures
+as CSV: [tables.csv](tables.csv).
+
+```sh
+benchmarks/quality/tables.py --resolution {resolution}
+```
+
+Worlds: `roxel synth WORLD --seed {seed}` with its other options at their defaults. Runs: `roxel reconstruct --update RULE --agreement
+AGREEMENT --color-space SPACE --resolution {resolution}` (the street: `--voxel-size 1`, light as its heading says), all else at its
+default, so masks are used and noise and scale are the space's own. `roxels` is the rule that the thesis prints, `posterior` is ours.
+Measured by `roxel eval --opacity-threshold {opacity} --confidence-threshold {confidence}`: one threshold of each for all
+([evaluation.md](../evaluation.md)). *RMS* is over the object; *surface covered* is the share of what two views see that has a counted voxel
+within one voxel; *F* is of the depth points at 1 % of the box's diagonal.
+
+The thesis's rows are [Jethwa04] tables 8.1 to 8.4: other objects of the same kind, other cameras and another size of voxels, so the
+numbers of voxels do not compare and the rest does so roughly. The thesis measures from the nearest voxel of the true surface, `roxel eval`
+from the surface.
+"""
+
+
+def world_part(world, results, sheets):
+    lines = [f"## {world}: {WORLDS[world].what}", ""]
+    if WORLDS[world].light:
+        lines += ["`" + " ".join("SKIES" if o == "SKY" else o for o in WORLDS[world].light) + "`", ""]
+    lines += [*world_table(world, results), ""]
+    if WORLDS[world].shared:
+        return lines
+    if world in sheets:
+        rules = ", then ".join(f"`{update}`" for update in WORLDS[world].updates)
+        lines += [f"Photograph {WORLDS[world].view} and its renders with exponential RGB, Gaussian RGB, Gaussian Luv; {rules}:", "",
+                  f"![renders of {world}]({world}-renders.jpg)", ""]
+    thesis = f", as figures {WORLDS[world].figures} of the thesis" if WORLDS[world].figures else ""
+    return lines + [f"Cross-sections (opacity in grey, the true outline in red) and voxels by distance{thesis}:", "",
+                    *picture_table(world, results), ""]
+
+
+def document(results, resolution, remarks="", fine={}, sheets=()):
+    lines = HEAD.format(resolution=resolution, seed=SEED, opacity=OPACITY_THRESHOLD,
+                        confidence=CONFIDENCE_THRESHOLD).splitlines() + [""]
+    for world in WORLDS:
+        if any(run[0] == world for run in results):
+            lines += world_part(world, results, sheets)
+    if fine:
+        lines += [f"## The default choice at resolution {FINE_RESOLUTION}", "",
+                  "`posterior`, Gaussian Luv; all options but the resolution (256) are the program's own.", "", *fine_table(fine), ""]
     lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results), ""]
     return "\n".join(lines) + (f"\n{remarks.strip()}\n" if remarks.strip() else "")
 
@@ -237,23 +372,29 @@ def write_csv(path, results):
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["source", "world", "update", "agreement", "color_space"] + [key for key, _ in COLUMNS])
-        for world, rows in THESIS.items():
-            for choice, known in rows.items():
+        for world in WORLDS:
+            for choice, known in thesis_rows(world).items():
                 writer.writerow(["thesis", world, "", *choice, *known] + [""] * (len(COLUMNS) - 3))
         for run, values in results.items():
             shown = ["" if values[key] is None else f"{values[key]:.6g}" for key, _ in COLUMNS]
             writer.writerow(["roxel", *run, *shown])
 
 
-def parse(arguments):
+def add_places(parser):
+    """Options for programs and folders that all pages share."""
     root = pathlib.Path(__file__).resolve().parents[2]
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--roxel", type=pathlib.Path, default=root / "build/release/apps/roxel/roxel",
                         help="the program [build/release/apps/roxel/roxel]")
     parser.add_argument("--work", type=pathlib.Path, default=root / "build/quality",
                         help="where data sets and runs go and stay [build/quality]")
-    parser.add_argument("--docs", type=pathlib.Path, default=root / "docs/results",
-                        help="where tables.md and tables.csv go [docs/results]")
+    parser.add_argument("--docs", type=pathlib.Path, default=root / "docs/results", help="where pages go [docs/results]")
+    parser.add_argument("--sheets", type=pathlib.Path, default=root / "build/release/benchmarks/quality/contact_sheet",
+                        help="the program that puts pictures side by side [build/release/benchmarks/quality/contact_sheet]")
+
+
+def parse(arguments):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_places(parser)
     parser.add_argument("--resolution", type=int, default=96,
                         help="finest voxels along the longest side; 256 is the program's own [96]")
     parser.add_argument("--only", default="", help="make the runs whose name WORLD-RULE-AGREEMENT-SPACE "
@@ -265,17 +406,27 @@ def parse(arguments):
 def main(arguments):
     options = parse(arguments)
     wanted = [] if options.write_only else selected(options.only)
-    if not wanted and not options.write_only:
+    if not wanted and not options.write_only and not fnmatch.filter([f"fine-{world}" for world in FINE], options.only):
         sys.exit(f"tables: no run matches --only {options.only}; they are named like {run_name(all_runs()[0])}")
     for run in wanted:
-        measure(run, options)
-    folders = {run: options.work / str(options.resolution) / (run_name(run) + "-metrics") for run in all_runs()}
-    results = {run: read_figures(folder) for run, folder in folders.items() if (folder / "metrics.json").exists()}
+        if measure(run, options) is None:
+            print(f"skipped: {run_name(run)}, as ROXEL_TEST_DATA has no {WORLDS[run[0]].data}", file=sys.stderr)
+    fine_runs = {world: (world, "posterior", "gaussian", "luv") for world in FINE}
+    for world, run in fine_runs.items():
+        if not options.write_only and (not options.only or fnmatch.fnmatch(f"fine-{world}", options.only)):
+            measure(run, options, FINE_RESOLUTION)
+    metrics_of = lambda run, resolution: options.work / str(resolution) / (run_name(run) + "-metrics")
+    there = lambda folder: (folder / "metrics.json").exists()
+    folders = {run: metrics_of(run, options.resolution) for run in all_runs()}
+    results = {run: read_figures(folder) for run, folder in folders.items() if there(folder)}
+    fine = {world: read_figures(metrics_of(run, FINE_RESOLUTION)) for world, run in fine_runs.items()
+            if there(metrics_of(run, FINE_RESOLUTION))}
     options.docs.mkdir(parents=True, exist_ok=True)
     copy_pictures(results, folders, options.docs)
+    sheets = [world for world in WORLDS if render_sheet(world, results, options)]
     remarks = pathlib.Path(__file__).with_name("tables_remarks.md")
     (options.docs / "tables.md").write_text(
-        document(results, options.resolution, remarks.read_text() if remarks.exists() else ""))
+        document(results, options.resolution, remarks.read_text() if remarks.exists() else "", fine, sheets))
     write_csv(options.docs / "tables.csv", results)
     print(f"{len(results)} of {len(all_runs())} runs -> {options.docs / 'tables.md'}")
 

@@ -7,6 +7,7 @@ import re
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import tables  # noqa: E402
@@ -77,7 +78,7 @@ class Tables(unittest.TestCase):
             path = pathlib.Path(folder) / "tables.csv"
             tables.write_csv(path, results)
             lines = path.read_text().splitlines()
-        self.assertEqual(len(lines), 1 + 6 + 3)
+        self.assertEqual(len(lines), 1 + 12 + 3)
         self.assertIn("thesis,head,,gaussian,luv,62996,64.2,59.9,,,,,", lines)
         self.assertIn("roxel,plane,posterior,gaussian,luv,1000,90,80,95.5,5,61,84,0.9876", lines)
 
@@ -99,11 +100,38 @@ class Tables(unittest.TestCase):
             self.assertEqual((docs / "plane-posterior-gaussian-rgb-section_x.svg").read_text(), "plane-posterior-gaussian-rgb")
 
 
+    def test_specks_of_an_outline_are_left_out(self):
+        self.assertEqual(tables.without_specks('<path d="M1 1L1.2 1M0 0L3 0.5M9 9L9 9.4" fill="none"/>'),
+                         '<path d="M0 0L3 0.5" fill="none"/>')
+        self.assertEqual(tables.without_specks('<path d="M1 1L1.1 1L5 5"/>'), '<path d="M1 1L1.1 1L5 5"/>')
+
+
 class Runs(unittest.TestCase):
     def test_names_select(self):
-        self.assertEqual(len(tables.selected("")), 24)
+        self.assertEqual(len(tables.selected("")), 4 * 8 + 8 + 2 * 6 + 1)
         self.assertEqual(len(tables.selected("head-roxels-*")), 4)
         self.assertEqual(tables.selected("nothing"), [])
+
+    def test_a_streets_light_is_in_its_command(self):
+        run = ("street-sky", "roxels", "gaussian", "luv")
+        self.assertEqual(tables.reconstruct_options(run, 96, "there"),
+                         ["--update", "roxels", "--agreement", "gaussian", "--color-space", "luv", "--voxel-size", "1",
+                          "--illumination", "sky", "--matching", "canonical", "--sky", "there"])
+        self.assertIn("96", tables.reconstruct_options(("plane", "roxels", "gaussian", "luv"), 96))
+
+    def test_the_thesis_has_its_four_tables(self):
+        self.assertEqual([tables.WORLDS[w].table for w in tables.WORLDS if tables.WORLDS[w].table],
+                         [f"Table 8.{i}" for i in (1, 2, 3, 4)])
+        self.assertEqual(tables.thesis_rows("street-sky")[("gaussian", "luv")], (116920, 47.3, 43.9))
+        self.assertEqual(tables.thesis_rows("mug"), {})
+
+    def test_shared_data_are_skipped_where_there_are_none(self):
+        run = ("shared-plane", "posterior", "gaussian", "luv")
+        options = type("Options", (), {"roxel": "none", "resolution": 96})()
+        with tempfile.TemporaryDirectory() as name, unittest.mock.patch.dict(tables.os.environ, ROXEL_TEST_DATA=name):
+            options.work = pathlib.Path(name) / "work"
+            self.assertIsNone(tables.measure(run, options))
+        self.assertNotIn("section", "".join(tables.world_part("shared-plane", {run: tables.figures(metrics())}, [])))
 
     def test_a_run_is_made_once_and_again_when_its_command_changes(self):
         with tempfile.TemporaryDirectory() as name:

@@ -43,8 +43,10 @@ void measure(const char* dataset_path, const char* run, const char* images, int 
   std::printf("%zu images, %u voxels, %d threads\n%6s %12s %12s %9s | %12s %12s %9s %9s | %s\n",
               dataset.views.size(), volume.slot_count(), threads, "pass", "color rays", "steps", "wall s",
               "rays", "steps", "wall s", "ns/step", "mean log-likelihood");
+  PassMemory memory;
   for (int pass = 1; pass <= passes; ++pass) {
-    const PassReport report = run_pass(samples, pass_options(scene, options), context, nullptr, volume);
+    const PassReport report =
+        run_pass(samples, pass_options(scene, options), context, nullptr, volume, nullptr, &memory);
     std::printf("%6d %12lld %12lld %9.2f | %12lld %12lld %9.2f %9.1f | %.6f\n", pass,
                 static_cast<long long>(report.color.rays), static_cast<long long>(report.color.steps),
                 report.color_seconds, static_cast<long long>(report.opacity.rays),

@@ -3,14 +3,13 @@
 /// with the same flags and run on one thread. Times are processor time; exponents are fitted in the
 /// logarithm.
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <random>
 #include <vector>
 
+#include "processor_time.h"
 #include "roxel/infer/run_pass.h"
 
 namespace {
@@ -18,12 +17,6 @@ namespace {
 using namespace roxel;
 
 constexpr int kImageSide = 96;
-
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// Cameras on a ring around the box [-1, 1]^3, looking at its centre.
 PinholeCamera ring_camera(int index, int count) {

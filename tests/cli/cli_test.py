@@ -27,6 +27,18 @@ def run(*arguments, **kwargs):
     return subprocess.run([ROXEL, *map(str, arguments)], capture_output=True, text=True, timeout=120, **kwargs)
 
 
+def start_until(moment, *arguments):
+    """Starts roxel and returns once `moment` is said: the process, which is still at work, and all that it said."""
+    job = subprocess.Popen([ROXEL, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    said = ""
+    for line in job.stderr:
+        said += line
+        if moment in line:
+            break
+    assert job.poll() is None, said
+    return job, said
+
+
 def files_below(folder):
     return sorted(str(p.relative_to(folder)) for p in pathlib.Path(folder).rglob("*") if p.is_file())
 
@@ -272,12 +284,13 @@ DEPTH_CHANGES = {
     "refine-pixel-sigma": ([], ["--refine-pixel-sigma", "1"]),
     "refine-radius": ([], ["--refine-radius", "2"]),
     "refine-rounds": ([], ["--refine-rounds", "0"]),
+    "refine-scale": ([], ["--refine-scale", "1"]),
     "refine-seed": ([], ["--refine-seed", "7"]),
     "refine-sigmas": ([], ["--refine-sigmas", "0.5"]),
     "refine-views": ([], ["--refine-views", "1"]),
 }
 # Options that change files or what is said, and not the numbers; the tests of Switches and Depth are theirs.
-ELSEWHERE = set(DEPTH_CHANGES) | {"export", "depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "sky", "threads", "verbose"}
+ELSEWHERE = set(DEPTH_CHANGES) | {"checkpoints", "checkpoint-interval", "resume", "memory", "export", "depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "sky", "sky-again", "sky-light", "sky-masks", "sun", "threads", "verbose"}
 # Those of the surface, in mesh_test.py.
 MESH = {"colors", "faces", "hole-size", "level-seams", "mesh", "mesh-band", "mesh-error", "mesh-pictures", "mesh-smooth",
         "mesh-voxel-size", "min-views", "seam-cost", "smallest-part", "texture", "texture-size", "transient"}
@@ -377,6 +390,19 @@ class Depth(Case):
         self.assertEqual(self.channels(out), [b"Z.bp", b"V.bp"])
         self.succeed("depth", out, "--no-bp", "--quiet")
         self.assertEqual(self.channels(out), list(self.REFINED[2:]))
+
+    def test_the_page_is_drawn_again(self):
+        out, _ = self.reconstruct("page", "--no-bp", "--no-refine", "--no-mesh")
+        before = (out / "report.html").read_text()
+        self.assertNotIn("depth, refined", before)
+        self.succeed("depth", out, "--quiet")
+        after = (out / "report.html").read_text()
+        for caption in ("depth, refined", "normals", "<figcaption>render", "<figcaption>error", "refine depth"):
+            self.assertIn(caption, after)
+        self.assertEqual(before.count("<svg"), after.count("<svg"))
+        (out / "report.html").unlink()
+        self.succeed("depth", out, "--quiet")
+        self.assertFalse((out / "report.html").exists(), "a run without a page gets none")
 
     def test_a_run_without_depth_maps_is_marched_through(self):
         out, _ = self.reconstruct("bare", "--no-depth", "--no-render")
@@ -617,6 +643,33 @@ class OtherCommands(Case):
         for name, (expected, found) in pairs.items():
             self.assertTrue(0.5 < expected / found < 2, f"{name}: {expected} foreseen, {found} found")
 
+    def test_memory_is_kept_to_and_changes_no_result(self):
+        data = self.folder / "many"
+        self.synth(data, 24, "320x240")
+        size = ["--resolution", "32", "--levels", "2", "--passes", "2", "--threads", "1"]
+        free = json.loads(self.succeed("info", data, *size, "--json").stdout)["estimate"]
+        self.assertTrue(free["memory_fits"])
+        self.assertNotIn("made anew", self.succeed("info", data, *size).stdout)
+        tight = 0.9 * free["memory_bytes"] / 2**30
+        said = self.succeed("info", data, *size, "--memory", tight).stdout
+        self.assertIn("of samples are made anew in each pass", said)
+        found = {}
+        for name, arguments in (("ample", []), ("tight", ["--memory", str(tight)])):
+            out = self.folder / name
+            self.succeed("reconstruct", data, "-o", out, *size, *arguments, "--no-mesh", "--no-refine", "--quiet")
+            found[name] = numbers(json.loads((out / "summary.json").read_text())), digest(out / "voxels.ply")
+        self.assertEqual(found["ample"], found["tight"])
+        used = json.loads((self.folder / "tight/summary.json").read_text())["peak_memory_bytes"]
+        self.assertLess(used, tight * 2**30)
+
+    def test_too_little_memory_is_said_before_the_start(self):
+        out = self.folder / "never"
+        self.assertIn("--voxel-size", self.expect_error(2, "--memory: found 0.30 GiB where about ", "reconstruct", self.data,
+                                                        "-o", out, "--memory", "0.3", "--resolution", "512").stderr)
+        self.assertFalse(out.exists())
+        said = self.succeed("info", self.data, "--memory", "0.3", "--resolution", "512")
+        self.assertRegex(said.stdout, r"WARNING +memory: 0.30 GiB where about .* would fit")
+
     def test_synth_depends_on_its_seed_alone(self):
         worlds = {}
         for name, seed in (("a", 5), ("b", 5), ("c", 6)):
@@ -810,7 +863,10 @@ class Safety(Case):
         (older / "depth/000.exr").mkdir()
         before = digests(older)
         self.assertEqual(run("reconstruct", self.data, "-o", older, *TINY, "--quiet").returncode, 1)
-        self.assertEqual(digests(older), before)
+        kept = digests(older)
+        self.assertIsNotNone(kept.pop("checkpoint/latest.roxel", None))  # without the folder it could go on
+        kept.pop("checkpoint/previous.roxel", None)
+        self.assertEqual(kept, before)
         self.assertFalse((older / ".partial").exists())
 
     def test_merge_replaces_an_older_run(self):
@@ -845,14 +901,7 @@ class Interrupt(Case):
 
     def interrupt(self, out, moment, *arguments, number=signal.SIGINT):
         """Starts a run and signals it when `moment` is said; what it said, and how long it took to end."""
-        job = subprocess.Popen([ROXEL, "reconstruct", str(self.data), "-o", str(out), *arguments],
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        said = ""
-        for line in job.stderr:
-            said += line
-            if moment in line:
-                break
-        self.assertIsNone(job.poll(), said)
+        job, said = start_until(moment, "reconstruct", self.data, "-o", out, *arguments)
         start = time.monotonic()
         job.send_signal(number)
         out_text, rest = job.communicate(timeout=60)
@@ -881,7 +930,9 @@ class Interrupt(Case):
         self.succeed("reconstruct", self.data, "-o", out, *TINY)
         before = digests(out)
         self.interrupt(out, "writing", "--resolution", "128", "--levels", "1", "--passes", "1")
-        self.assertEqual(digests(out), before)
+        kept = digests(out)
+        self.assertIsNotNone(kept.pop("checkpoint/latest.roxel", None))  # resume_test.py goes on from such
+        self.assertEqual(kept, before)
         self.assertFalse((out / ".partial").exists())
 
     def test_while_a_run_is_read_ends_in_order(self):

@@ -278,6 +278,7 @@ class Options(EvalCase):
         "distances": (["--truth", "MESH"], ["--distances", "0.3"]),
         "estimate": (["--truth", "MESH"], ["--estimate", "MESH/mesh.ply"]),
         "opacity-threshold": (["--truth", "MESH"], ["--opacity-threshold", "0.5"]),
+        "confidence-threshold": (["--truth", "MESH"], ["--confidence-threshold", "0.5"]),
         "views-agree": (["--truth", "MESH"], ["--views-agree", "3"]),
         "samples": (["--truth", "MESH"], ["--samples", "1000"]),
         "seed": (["--truth", "MESH"], ["--seed", "2"]),
@@ -286,6 +287,12 @@ class Options(EvalCase):
 
     def line(self, arguments):
         return [a.replace("MESH", str(self.mesh)).replace("OTHER", str(self.folder / "other")) for a in arguments]
+
+    def test_thresholds_leave_voxels_out(self):
+        voxels = [self.measures("--truth", self.mesh, *more)["volume"]["voxels"]
+                  for more in ([], ["--opacity-threshold", "0.5"], ["--confidence-threshold", "0.5"])]
+        self.assertLess(voxels[1], voxels[0])
+        self.assertLess(voxels[2], voxels[0])
 
     def test_every_option_changes_something(self):
         other = self.folder / "other"

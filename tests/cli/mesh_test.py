@@ -154,6 +154,15 @@ class Mesh(Case):
         self.assertIn("<h2>Surface</h2>", page)
         self.assertIn('class="turntable"', page)
         self.assertIn("textured", page)
+        self.succeed("mesh", out, "--texture", "none", "--faces", "600", "--quiet")
+        again = (out / "report.html").read_text()
+        triangles = json.loads((out / "summary.json").read_text())["mesh"]["triangles"]
+        self.assertIn(f"<td>triangles</td><td>{triangles}</td>", again)
+        self.assertNotIn("textured", again)
+        self.assertEqual(page.count("<figcaption>depth, refined"), again.count("<figcaption>depth, refined"))
+        said = self.succeed("depth", out).stderr
+        self.assertIn("the mesh is still that of the earlier depth maps", said)
+        self.assertIn('class="turntable"', (out / "report.html").read_text())
 
 
 if __name__ == "__main__":

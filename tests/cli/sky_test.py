@@ -12,7 +12,7 @@ import sys
 import unittest
 
 import cli_test
-from cli_test import digest, files_below
+from cli_test import digest, files_below, start_until
 
 WIDTH, HEIGHT = 128, 64
 
@@ -238,31 +238,38 @@ def main():
 
 
 
+SMALL = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--no-depth", "--no-report", "--quiet"]
+
+
+def set_up_street(cls):
+    super(cls, cls).setUpClass()
+    cls.street, cls.skies = cls.folder / "street", cls.folder / "street-skies"
+    made = cli_test.run("synth", "street", "-o", cls.street, "--images", "48", "--size", "48x38", "--samples", "1", "--quiet")
+    assert made.returncode == 0, made.stderr
+    made = cli_test.run("sky", cls.street, "-o", cls.skies, "--no-pictures", "--quiet")
+    assert made.returncode == 0, made.stderr
+
+
+def reconstruct_street(self, name, *arguments):
+    out = self.folder / name
+    self.succeed("reconstruct", self.street, "-o", out, *SMALL, *arguments)
+    return out, json.loads((out / "summary.json").read_text())
+
+
+def lights_of_nodes(self, summary):
+    by_node = {}
+    for view in summary["views"]: by_node.setdefault(view["name"][:3], set()).add(tuple(view["light"]))
+    return by_node
+
+
 class SkyInReconstruct(SkyCase):
     """A street of three nodes, each with its own time."""
 
-    SMALL = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--quiet"]
-
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        cls.street = cls.folder / "street"
-        made = cli_test.run("synth", "street", "-o", cls.street, "--images", "48", "--size", "48x38", "--samples", "1", "--quiet")
-        assert made.returncode == 0, made.stderr
-
-    def reconstruct(self, name, *arguments):
-        out = self.folder / name
-        self.succeed("reconstruct", self.street, "-o", out, *self.SMALL, *arguments)
-        return out, json.loads((out / "summary.json").read_text())
-
-    def lights(self, summary):
-        by_node = {}
-        for view in summary["views"]: by_node.setdefault(view["name"][:3], set()).add(tuple(view["light"]))
-        return by_node
+    setUpClass, reconstruct, lights = classmethod(set_up_street), reconstruct_street, lights_of_nodes
 
     def test_skies_of_another_run_give_light_and_background(self):
-        skies, _ = self.sky("street-sky", "--no-pictures", data=self.street)
-        _, plain = self.reconstruct("plain")
+        skies = self.skies
+        _, plain = self.reconstruct("plain", "--illumination", "none")
         out, lit = self.reconstruct("lit", "--sky", skies)
         self.assertEqual(plain["scene"]["light"]["illumination"], "none")
         self.assertEqual((lit["scene"]["light"]["illumination"], lit["scene"]["light"]["matching"]), ("sky", "local"))
@@ -273,7 +280,7 @@ class SkyInReconstruct(SkyCase):
         self.assertNotEqual(digest(out / "voxels.ply"), digest(self.folder / "plain" / "voxels.ply"))
 
     def test_skies_are_fitted_where_they_are_asked_for(self):
-        skies, _ = self.sky("street-sky2", "--no-pictures", data=self.street)
+        skies = self.skies
         _, given = self.reconstruct("given", "--sky", skies, "--illumination", "sky")
         out, fitted = self.reconstruct("fitted", "--illumination", "sky")
         self.assertEqual(self.lights(given), self.lights(fitted))
@@ -290,6 +297,78 @@ class SkyInReconstruct(SkyCase):
         self.expect_error(2, "skies of other photographs", "reconstruct", self.street, "-o", self.folder / "no", "--sky", skies)
         self.expect_error(2, "missing", "reconstruct", self.street, "-o", self.folder / "no", "--sky", self.folder / "missing")
         self.assertFalse((self.folder / "no").exists())
+
+
+class LightInReconstruct(SkyCase):
+    """The same street: what its light is worth, and how it is found."""
+
+    setUpClass, reconstruct, lights = classmethod(set_up_street), reconstruct_street, lights_of_nodes
+
+    def test_photographs_of_several_times_of_day_are_brought_to_one_light(self):
+        _, found = self.reconstruct("by-itself")
+        self.assertEqual(found["scene"]["light"]["illumination"], "sky")
+        self.assertTrue(any("several times of day" in note for note in found["notes"]), found["notes"])
+
+    def test_shading_and_shadow_are_divided_out_where_that_is_asked_for(self):
+        skies = self.skies
+        flat, _ = self.reconstruct("flat", "--sky", skies, "--illumination", "sky")
+        out, summary = self.reconstruct("shaded", "--sky", skies, "--illumination", "sky-normal", "--threads", "1")
+        again, _ = self.reconstruct("shaded2", "--sky", skies, "--illumination", "sky-normal", "--threads", "3")
+        self.assertEqual(summary["scene"]["light"]["illumination"], "sky-normal")
+        self.assertNotEqual(digest(flat / "voxels.ply"), digest(out / "voxels.ply"))
+        self.assertEqual(digest(out / "voxels.ply"), digest(again / "voxels.ply"))
+        name = summary["views"][0]["name"]
+        self.assertIn(f"light/{name}.exr", files_below(out))
+        self.assertEqual(digest(out / f"light/{name}.exr"), digest(again / f"light/{name}.exr"))
+        self.assertNotIn(f"light/{name}.exr", files_below(flat))
+        self.reconstruct("shaded", "--illumination", "none")
+        self.assertNotIn(f"light/{name}.exr", files_below(out))
+
+    def test_rays_that_the_volume_leaves_unexplained_feed_the_next_fit(self):
+        two = ["--illumination", "sky", "--levels", "2"]
+        _, looked = self.reconstruct("looked", *two, "--sky-again")
+        self.assertEqual([node["node"] for node in looked["skies_again"]], [node["node"] for node in looked["skies"]])
+        for node in looked["skies_again"]:
+            self.assertGreater(node["unexplained_share"], 0)
+            if not node["taken"]: self.assertLess(node["mask_share"], node["mask_share_before"] + 0.01)
+        _, once = self.reconstruct("once", *two)
+        self.assertNotIn("skies_again", once)
+
+    def test_a_killed_run_goes_on_with_its_light_and_the_skies_that_it_found(self):
+        for name, arguments in (("again", ["--illumination", "sky", "--sky-again"]),
+                                ("normal", ["--sky", str(self.skies), "--illumination", "sky-normal"])):
+            with self.subTest(name):
+                options = [*SMALL, "--levels", "2", "--passes", "5", "--all-passes", "--checkpoint-interval", "0", *arguments]
+                whole, out = self.folder / f"whole-{name}", self.folder / f"killed-{name}"
+                self.succeed("reconstruct", self.street, "-o", whole, *options)
+                talking = [option for option in options if option != "--quiet"]
+                job, _ = start_until("level 2/2 pass 3/", "reconstruct", self.street, "-o", out, *talking)
+                job.kill()
+                job.communicate(timeout=60)
+                self.succeed("reconstruct", self.street, "-o", out, *options, "--resume")
+                expected, found = (json.loads((run / "summary.json").read_text()) for run in (whole, out))
+                self.assertTrue(any(note.startswith("resumed after level 2") for note in found["notes"]), found["notes"])
+                self.assertEqual(digest(out / "voxels.ply"), digest(whole / "voxels.ply"))
+                for key in ("skies", "skies_again", "views"): self.assertEqual(found.get(key), expected.get(key))
+                for file in files_below(whole):
+                    if file.startswith("sky/") and file.endswith((".exr", ".png")):
+                        self.assertEqual(digest(out / file), digest(whole / file), file)
+
+    def test_sun_and_sky_may_be_given_by_hand(self):
+        _, given = self.reconstruct("by-hand", "--illumination", "sky", "--sun", "200,35")
+        for node in given["skies"]:
+            self.assertEqual(node["sun_source"], "given")
+            self.assertAlmostEqual(node["sun"][0], 200, places=6)
+        self.expect_error(2, "--sun: found no sky that is fitted", "reconstruct", self.street, "-o", self.folder / "no", "--sun", "200,35",
+                          "--illumination", "none")
+        self.expect_error(2, "--sky-masks", "reconstruct", self.street, "-o", self.folder / "no", "--sky-masks", self.folder,
+                          "--illumination", "sky")
+
+    def test_the_mean_of_the_dome_is_another_light(self):
+        skies = self.skies
+        _, horizontal = self.reconstruct("horizontal", "--sky", skies)
+        _, mean = self.reconstruct("mean", "--sky", skies, "--sky-light", "mean")
+        self.assertNotEqual(self.lights(horizontal), self.lights(mean))
 
 
 if __name__ == "__main__":

@@ -53,12 +53,12 @@ const std::vector<Sample>& samples() {
   return all;
 }
 
-double unit(unsigned x) { return (x % 1000003) / 1000002.0; }
+double to_unit(unsigned x) { return (x % 1000003) / 1000002.0; }
 
 /// A position inside the valid disc, and inside a cone of 75 degrees.
 Vector2d position(double radius, unsigned a, unsigned b) {
-  const double r = 0.995 * unit(a) * std::min(radius, std::tan(75 * std::numbers::pi / 180));
-  const double angle = 2 * std::numbers::pi * unit(b);
+  const double r = 0.995 * to_unit(a) * std::min(radius, std::tan(75 * std::numbers::pi / 180));
+  const double angle = 2 * std::numbers::pi * to_unit(b);
   return {r * std::cos(angle), r * std::sin(angle)};
 }
 
@@ -161,7 +161,7 @@ RC_GTEST_PROP(Lens, DistortedRadiusGrowsUpToTheValidRadius, (unsigned b)) {
     const double end = std::atan(radius);
     double last = 0;
     for (int i = 1; i <= 200; ++i) {
-      const double r = std::tan(end * i / 200), angle = 2 * std::numbers::pi * unit(b);
+      const double r = std::tan(end * i / 200), angle = 2 * std::numbers::pi * to_unit(b);
       const double distorted = distort(l, Vector2d(r * std::cos(angle), r * std::sin(angle))).norm();
       RC_ASSERT(distorted > last);
       last = distorted;

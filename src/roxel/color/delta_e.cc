@@ -2,10 +2,11 @@
 
 #include <cmath>
 
+#include "roxel/base/angles.h"
+
 namespace roxel {
 namespace {
 
-constexpr double kDegree = M_PI / 180;
 constexpr double k25To7 = 6103515625.0;  // 25^7
 
 double compressed(double ratio) {

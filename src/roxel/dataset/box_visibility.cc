@@ -10,7 +10,7 @@
 namespace roxel {
 namespace {
 
-constexpr int kCells = 16;
+constexpr int kVisibilityCells = 16;
 constexpr double kFineVoxelPx = 0.4;   // below it a voxel is far under a pixel
 constexpr double kCoarseVoxelPx = 16;  // above it the photographs hold much more than the volume
 constexpr double kFewViews = 0.5;
@@ -47,7 +47,7 @@ double depth_of_box(const View& view, const CellGrid& grid, const std::vector<bo
 }  // namespace
 
 BoxVisibility box_visibility(const Dataset& dataset, const SceneBounds& bounds, double voxel_size) {
-  const CellGrid grid(bounds.box, kCells);
+  const CellGrid grid(bounds.box, kVisibilityCells);
   BoxVisibility result;
   std::vector<int> nodes_seeing(grid.cell_count(), 0);
   std::vector<double> widths_px;

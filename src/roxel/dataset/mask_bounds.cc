@@ -9,7 +9,7 @@
 namespace roxel {
 namespace {
 
-constexpr int kCells = 48;
+constexpr int kMaskCells = 48;
 constexpr int kRounds = 2;
 constexpr std::size_t kMostViews = 120;  // evenly chosen: more of them tell a coarse hull little
 constexpr double kBackgroundVeto =
@@ -107,7 +107,7 @@ Eigen::AlignedBox3d tighten_by_masks(const Eigen::AlignedBox3d& box, const Datas
   if (masked.empty()) return box;
   Eigen::AlignedBox3d region = box;
   for (int round = 0; round < kRounds; ++round) {
-    const CellGrid grid(region, kCells);
+    const CellGrid grid(region, kMaskCells);
     const Eigen::AlignedBox3d hull = hull_box(masked, grid);
     if (hull.isEmpty()) return region;
     // A cell of margin: partly covered cells, and masks that cut a little too much.

@@ -53,9 +53,9 @@ std::optional<Opinion> ask(const AgreeingView& other, const Eigen::Vector3d& pix
 }
 
 /// Asks for one view, row by row.
-class Agreement {
+class ViewAgreement {
  public:
-  Agreement(const RefinedView& own, std::span<const AgreeingView> others, const RunContext& context)
+  ViewAgreement(const RefinedView& own, std::span<const AgreeingView> others, const RunContext& context)
       : own_(own), others_(others), context_(context) {}
 
   AgreedView join() {
@@ -170,7 +170,7 @@ class Agreement {
 
 AgreedView agree_views(const RefinedView& own, std::span<const AgreeingView> others,
                        const RunContext& context) {
-  return Agreement(own, others, context).join();
+  return ViewAgreement(own, others, context).join();
 }
 
 }  // namespace roxel

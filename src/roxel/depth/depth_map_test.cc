@@ -175,12 +175,12 @@ TEST_F(Sheets, PredictionLeavesTheNodesOwnColoursOut) {
   const RunContext context(1);
   CollectedColors collected(volume_.slot_count(), 1, 0);
   collect_color(stack, nodes, pass_, context, nullptr, collected);
-  compare_with_others(stack, nodes, 0, pass_, collected, context, scratch);
+  compare_with_others(stack, nodes[0], 0, pass_, collected, context, scratch);
   const DepthMap alone = estimate_depth(stack, node, pass_, {}, nullptr, context, scratch).front().depth;
   EXPECT_NEAR(*alone.opacity.pixel(4, 4), 0.6, 5e-3);
   pass_.predictive = false;
   scratch.reset();
-  compare_with_others(stack, nodes, 0, pass_, collected, context, scratch);
+  compare_with_others(stack, nodes[0], 0, pass_, collected, context, scratch);
   const DepthMap fooled = estimate_depth(stack, node, pass_, {}, nullptr, context, scratch).front().depth;
   EXPECT_GT(*fooled.opacity.pixel(4, 4), 0.99);
 }

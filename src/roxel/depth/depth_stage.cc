@@ -11,13 +11,16 @@
 
 #include "roxel/base/parallel.h"
 #include "roxel/depth/agree_views.h"
+#include "roxel/depth/scaled_view.h"
 
 namespace roxel {
 namespace {
 
 constexpr std::size_t kCachedBytes = std::size_t{1} << 30;  ///< of views beside the one that is worked on
 constexpr double kMostVoxels = 0.8;                         ///< of a depth's deviation, as refinement sees it
-constexpr int kSampleStride = 8;  ///< pixels between samples that sources are chosen by
+constexpr double kUnconfirmed = 1;       ///< voxels that a depth may move by which no other view sees there
+constexpr double kAnotherSurface = 1.5;  ///< times as far as refinement may move: not this pixel's plane
+constexpr int kSampleStride = 8;         ///< at most: pixels between samples that sources are chosen by
 
 class Clock {
  public:
@@ -142,6 +145,7 @@ class DepthStage {
 
   void refine_all() {
     const Clock clock;
+    set_scale();
     ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24);
     std::vector<std::vector<int>> sources(count_);
     for (int v = 0; v < count_; ++v) {
@@ -156,6 +160,37 @@ class DepthStage {
     figures_.refine_seconds = clock.seconds();
   }
 
+  /// How much smaller all views are made: alike, so that patches are as sharp in one as in another.
+  void set_scale() {
+    scale_ = options_.refine_scale.value_or(1);
+    if (!options_.refine_scale) {
+      std::vector<double> across(count_);
+      parallel_for(count_, context_.thread_count(), [&](std::int64_t v, int) {
+        context_.throw_if_cancelled();
+        across[v] = voxel_in_pixels(files_.read(static_cast<int>(v)).depth,
+                                    mean_focal(dataset_.views[v].camera), scene_.voxel_size);
+      });
+      scale_ = choose_scale(std::move(across));
+    }
+    figures_.refine_scale = scale_;
+    small_ = dataset_;
+    for (View& view : small_.views) view.camera = scaled(view.camera, scale_);
+  }
+
+  /// What the volume and belief propagation say, before refinement.
+  static Image depth_before(const DepthLayers& layers) {
+    return layers.depth_bp.empty() ? believed_depth(layers) : layers.depth_bp;
+  }
+
+  /// The volume's variance, belief propagation's where only that has depth.
+  static Image variance_before(const DepthLayers& layers) {
+    Image variance = layers.variance;
+    if (layers.variance_bp.empty()) return variance;
+    for (std::size_t i = 0; i < variance.data().size(); ++i)
+      if (!(layers.depth.data()[i] > 0)) variance.data()[i] = layers.variance_bp.data()[i];
+    return variance;
+  }
+
   Image luma_of(int v) const {
     const Photograph photo = load_(dataset_.views[v]);
     return matching_luma(photo.rgb, scene_.white, photo.valid);
@@ -163,22 +198,25 @@ class DepthStage {
 
   MatchView match_view(int v) const {
     const DepthLayers layers = files_.read(v);
-    const Photograph photo = load_(dataset_.views[v]);
-    MatchView view{dataset_.views[v].camera,
-                   matching_luma(photo.rgb, scene_.white, photo.valid),
-                   matching_color(photo.rgb, scene_.white),
-                   {},
-                   layers.variance};
+    const Photograph photo = scaled(load_(dataset_.views[v]), scale_);
+    const int width = photo.rgb.width(), height = photo.rgb.height();
+    MatchView view{small_.views[v].camera, matching_luma(photo.rgb, scene_.white, photo.valid),
+                   matching_color(photo.rgb, scene_.white), Image(width, height, 1), Image(width, height, 1)};
     const float most = static_cast<float>(kMostVoxels * kMostVoxels * scene_.voxel_size * scene_.voxel_size);
-    for (float& variance : view.variance.data()) variance = std::min(variance, most);
-    view.depth = layers.depth_bp.empty() ? believed_depth(layers) : layers.depth_bp;
+    const Image before = depth_before(layers), variance = variance_before(layers);
+    const std::vector<std::int64_t> surest = surest_pixels(before, variance, scale_);
+    for (std::size_t i = 0; i < surest.size(); ++i) {
+      if (surest[i] < 0) continue;
+      view.depth.data()[i] = before.data()[surest[i]];
+      view.variance.data()[i] = std::min(variance.data()[surest[i]], most);
+    }
     return view;
   }
 
   std::vector<int> refine_one(int v, ViewCache<MatchView>& views) {
-    const auto own = views.get({v}, dataset_, context_).front();
-    const std::vector<int> sources = choose_sources(dataset_, v, own->depth, options_.refine_views);
-    const auto held = views.get(sources, dataset_, context_);
+    const auto own = views.get({v}, small_, context_).front();
+    const std::vector<int> sources = choose_sources(small_, v, own->depth, options_.refine_views);
+    const auto held = views.get(sources, small_, context_);
     std::vector<const MatchView*> pointers;
     for (const auto& view : held) pointers.push_back(view.get());
     const double focal = mean_focal(own->camera);
@@ -188,14 +226,13 @@ class DepthStage {
     options.patch.radius = options_.refine_radius;
     options.patch.noise = options_.refine_noise;
     options.patch.gap = scene_.voxel_size;
-    options.pixel_sigma = options_.refine_pixel_sigma;
+    options.pixel_sigma = options_.refine_pixel_sigma / scale_;
     options.sources = options_.refine_views;
     options.iterations = options_.refine_rounds;
     options.sigmas = options_.refine_sigmas;
     options.seed = options_.refine_seed;
     RefinedView refined = refine_view(*own, pointers, start, options, context_);
     doubt_unmatched(v, refined);
-    for (const float c : refined.correlation.data()) figures_.matched_pixels += c > 0;
     files_.keep(v, refined);
     return sources;
   }
@@ -203,46 +240,60 @@ class DepthStage {
   /// Where photographs say nothing, the volume's own variance stays.
   void doubt_unmatched(int v, RefinedView& refined) const {
     const DepthLayers layers = files_.read(v);
+    const Image variance = variance_before(layers);
+    const std::vector<std::int64_t> surest = surest_pixels(depth_before(layers), variance, scale_);
     for (std::size_t i = 0; i < refined.planes.planes.size(); ++i) {
       const float w = refined.planes.planes[i].w;
-      if (w <= 0 || refined.correlation.data()[i] > 0) continue;
-      const float variance =
-          layers.depth.data()[i] > 0 ? layers.variance.data()[i] : layers.variance_bp.data()[i];
-      refined.variance.data()[i] = refined.shared.data()[i] = variance * w * w * w * w;
+      if (w <= 0 || refined.correlation.data()[i] > 0 || surest[i] < 0) continue;
+      refined.variance.data()[i] = refined.shared.data()[i] = variance.data()[surest[i]] * w * w * w * w;
     }
   }
 
   void agree_one(int v, const std::vector<int>& sources, ViewCache<RefinedView>& refined) {
-    const auto own = refined.get({v}, dataset_, context_).front();
+    const auto own = refined.get({v}, small_, context_).front();
     AgreedView agreed{own->planes, own->variance, Image(own->planes.width, own->planes.height, 1)};
     if (options_.refine_agree) {
-      const auto held = refined.get(sources, dataset_, context_);
+      const auto held = refined.get(sources, small_, context_);
       std::vector<AgreeingView> others;
       for (std::size_t i = 0; i < sources.size(); ++i)
-        others.push_back(
-            {held[i].get(), PatchWarp(dataset_.views[v].camera, dataset_.views[sources[i]].camera)});
+        others.push_back({held[i].get(), PatchWarp(small_.views[v].camera, small_.views[sources[i]].camera)});
       agreed = agree_views(*own, others, context_);
     }
-    write_refined(v, agreed);
+    write_refined(v, agreed, own->correlation);
   }
 
-  void write_refined(int v, const AgreedView& agreed) {
+  /// Each pixel's depth on the plane that shows its surface; as it was before, with the variance that it had,
+  /// where there is no such plane.
+  void write_refined(int v, const AgreedView& agreed, const Image& correlation) {
     DepthLayers layers = files_.read(v);
-    const int width = agreed.planes.width, height = agreed.planes.height;
+    const Image before = depth_before(layers), variance = variance_before(layers);
+    const double reach = kAnotherSurface * options_.refine_sigmas * kMostVoxels * scene_.voxel_size;
+    const int width = before.width(), height = before.height();
     layers.depth_refined = Image(width, height, 1);
     layers.variance_refined = Image(width, height, 1);
     layers.normal = Image(width, height, 3);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
-        const PixelPlane& plane = agreed.planes.at(x, y);
-        if (plane.empty()) continue;
+        const float expected = *before.pixel(x, y);
+        if (!(expected > 0)) continue;
         ++figures_.refined_pixels;
-        figures_.agreed_pixels += *agreed.views.pixel(x, y) > 0;
+        *layers.depth_refined.pixel(x, y) = expected;
+        *layers.variance_refined.pixel(x, y) = *variance.pixel(x, y);
+        const auto [plane, column, row] = plane_of_pixel(agreed.planes, scale_, x, y, expected);
+        if (plane.empty()) continue;
         const float z = 1 / plane.w;
-        *layers.depth_refined.pixel(x, y) = z;
-        *layers.variance_refined.pixel(x, y) = *agreed.variance.pixel(x, y) * z * z * z * z;
+        const double moved = std::abs(z - expected);
+        if (scale_ > 1 && moved > reach) continue;
+        const bool matched = *correlation.pixel(column, row) > 0;
+        const bool confirmed = *agreed.views.pixel(column, row) > 0;
+        figures_.matched_pixels += matched;
+        figures_.agreed_pixels += confirmed;
         const Eigen::Vector3d normal = world_normal(dataset_.views[v].camera, plane, x + 0.5, y + 0.5);
         for (int c = 0; c < 3; ++c) layers.normal.pixel(x, y)[c] = static_cast<float>(normal[c]);
+        if (scale_ > 1 && !matched && !confirmed) continue;
+        if (options_.refine_agree && !confirmed && moved > kUnconfirmed * scene_.voxel_size) continue;
+        *layers.depth_refined.pixel(x, y) = z;
+        *layers.variance_refined.pixel(x, y) = *agreed.variance.pixel(column, row) * z * z * z * z;
       }
     files_.write(v, layers);
   }
@@ -264,6 +315,8 @@ class DepthStage {
   double progress_begin_, progress_end_;
   int count_;
   int steps_ = 0;
+  int scale_ = 1;
+  Dataset small_;  ///< with the cameras of the smaller views
   std::atomic<int> done_{0};
   DepthStageFigures figures_;
 };
@@ -294,9 +347,17 @@ OptionTable<DepthStageOptions> make_table() {
   table.add("bp-sweeps", &Options::bp_sweeps).help("Most messages a pixel sends").range(1, 100000);
   table.add("bp-fill", &Options::bp_fill).help("Give depth to pixels without, from their neighbours");
   table.add("refine", &Options::refine).help("Move depths to where the photographs agree best");
+  table.add("refine-scale", &Options::refine_scale)
+      .help("Side of the squares of pixels that refinement sees as one")
+      .unit("pixels")
+      .range(1, 16)
+      .unset("as many as leave a voxel 1.5 of them");
   table.add("refine-views", &Options::refine_views).help("Views that a patch is looked for in").range(1, 32);
   table.add("refine-rounds", &Options::refine_rounds).help("Rounds of propagation over a view").range(0, 100);
-  table.add("refine-radius", &Options::refine_radius).help("Radius of a patch").unit("pixels").range(1, 7);
+  table.add("refine-radius", &Options::refine_radius)
+      .help("Radius of a patch")
+      .unit("pixels, as refinement sees them")
+      .range(1, 7);
   table.add("refine-sigmas", &Options::refine_sigmas)
       .help("Deviations of the volume's depth that refinement may move it by")
       .range(0.1, 100);
@@ -322,14 +383,15 @@ const OptionTable<DepthStageOptions>& depth_option_table() {
 
 std::vector<int> choose_sources(const Dataset& dataset, int view_idx, const Image& depth, int most) {
   const PinholeCamera& own = dataset.views[view_idx].camera;
+  const int stride = std::clamp(std::min(depth.width(), depth.height()) / 16, 1, kSampleStride);
   std::vector<std::pair<double, int>> scores;
   for (int s = 0; s < static_cast<int>(dataset.views.size()); ++s) {
     if (s == view_idx) continue;
     const PinholeCamera& other = dataset.views[s].camera;
     if ((other.pose.centre - own.pose.centre).norm() == 0) continue;
     double score = 0;
-    for (int y = kSampleStride / 2; y < depth.height(); y += kSampleStride)
-      for (int x = kSampleStride / 2; x < depth.width(); x += kSampleStride) {
+    for (int y = stride / 2; y < depth.height(); y += stride)
+      for (int x = stride / 2; x < depth.width(); x += stride) {
         const float z = *depth.pixel(x, y);
         if (!(z > 0)) continue;
         const Ray ray = own.ray(x + 0.5, y + 0.5);
@@ -355,6 +417,7 @@ std::vector<int> choose_sources(const Dataset& dataset, int view_idx, const Imag
 
 void DepthStageFigures::add(const DepthStageFigures& other) {
   propagation.add(other.propagation);
+  refine_scale = std::max(refine_scale, other.refine_scale);
   refined_pixels += other.refined_pixels;
   matched_pixels += other.matched_pixels;
   agreed_pixels += other.agreed_pixels;

@@ -22,6 +22,7 @@ struct DepthStageOptions {
   bool bp_fill = false;
 
   bool refine = true;
+  std::optional<int> refine_scale;
   int refine_views = 8;
   int refine_rounds = 2;
   int refine_radius = 3;
@@ -45,6 +46,7 @@ struct DepthFiles {
 /// What a stage did, and what it cost.
 struct DepthStageFigures {
   PropagationFigures propagation;
+  int refine_scale = 1;             ///< pixels that refinement took for one, along an axis
   std::int64_t refined_pixels = 0;  ///< given depth
   std::int64_t matched_pixels = 0;  ///< of these, that photographs said something of
   std::int64_t agreed_pixels = 0;   ///< that another view agrees with

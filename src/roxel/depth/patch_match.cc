@@ -11,12 +11,11 @@ namespace roxel {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kLikeColor = 0.12f;  ///< difference of colours at which a sample counts e^-1/2
+constexpr float kLikePatchColor = 0.12f;  ///< difference of colours at which a sample counts e^-1/2
 
-/// A homography's numerators and denominator about the patch's middle.
-struct Steps {
-  float x0, xu, xv, y0, yu, yv, z0, zu, zv;
-};
+constexpr float kLeastWeight = 0.01f;  ///< samples that count less are left out
+
+using Steps = Patch::Steps;
 
 Steps steps_of(const PatchWarp& warp, const PixelPlane& plane, double u, double v) {
   const Eigen::Vector3d at = warp.from_pixel * Eigen::Vector3d(u, v, 1) + plane.w * warp.parallax;
@@ -224,18 +223,17 @@ Patch::Patch(const Image& luma, const Image& color, const PlaneMap& surface, int
   double sum = 0, squares = 0, mean = 0;
   for (int dy = -radius_; dy <= radius_; ++dy)
     for (int dx = -radius_; dx <= radius_; ++dx) {
+      if (x + dx < 0 || y + dy < 0 || x + dx >= luma.width() || y + dy >= luma.height()) continue;
+      const float value = *luma.pixel(x + dx, y + dy);
+      if (!std::isfinite(value)) continue;
+      const PixelPlane& other = surface.at(x + dx, y + dy);
+      const float expected = own.at(static_cast<float>(dx), static_cast<float>(dy));
+      if (other.empty() || std::abs(other.w - expected) > gap) continue;
+      const float off = unlikeness(luma, color, x, y, x + dx, y + dy) / (kLikePatchColor * kLikePatchColor);
+      const float weight = std::exp(-0.5f * off - spread * static_cast<float>(dx * dx + dy * dy));
+      if (weight < kLeastWeight) continue;
       du_[count_] = static_cast<float>(dx);
       dv_[count_] = static_cast<float>(dy);
-      float weight = 0, value = middle;
-      if (x + dx >= 0 && y + dy >= 0 && x + dx < luma.width() && y + dy < luma.height() &&
-          std::isfinite(*luma.pixel(x + dx, y + dy))) {
-        value = *luma.pixel(x + dx, y + dy);
-        const float off = unlikeness(luma, color, x, y, x + dx, y + dy) / (kLikeColor * kLikeColor);
-        weight = std::exp(-0.5f * off - spread * static_cast<float>(dx * dx + dy * dy));
-        const PixelPlane& other = surface.at(x + dx, y + dy);
-        const float expected = own.at(static_cast<float>(dx), static_cast<float>(dy));
-        if (other.empty() || std::abs(other.w - expected) > gap) weight = 0;
-      }
       weight_[count_] = weight;
       value_[count_] = value;
       ++count_;
@@ -255,8 +253,8 @@ Patch::Patch(const Image& luma, const Image& color, const PlaneMap& surface, int
   usable_ = sample_count_ >= 6;
 }
 
-bool Patch::corners_inside(const PatchSource& source, const PixelPlane& plane) const {
-  const Steps s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
+bool Patch::place(const PatchSource& source, const PixelPlane& plane, Steps& s) const {
+  s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
   const float r = static_cast<float>(radius_);
   const float right = static_cast<float>(source.luma->width()) - 2.5f;
   const float below = static_cast<float>(source.luma->height()) - 2.5f;
@@ -271,8 +269,11 @@ bool Patch::corners_inside(const PatchSource& source, const PixelPlane& plane) c
 }
 
 float Patch::correlation(const PatchSource& source, const PixelPlane& plane) const {
-  if (!corners_inside(source, plane)) return kNaN;
-  const Steps s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
+  Steps s;
+  return place(source, plane, s) ? correlation(source, s) : kNaN;
+}
+
+float Patch::correlation(const PatchSource& source, const Steps& s) const {
   const Sums sums = sum_samples(source.luma->data().data(), source.luma->width(), s, du_.data(), dv_.data(),
                                 weight_.data(), value_.data(), count_);
   const double variance = std::max(0.0, static_cast<double>(sums.vv) - static_cast<double>(sums.v) * sums.v);
@@ -282,8 +283,8 @@ float Patch::correlation(const PatchSource& source, const PixelPlane& plane) con
 
 Patch::Equations Patch::linearise(const PatchSource& source, const PixelPlane& plane) const {
   Equations out;
-  if (!corners_inside(source, plane)) return out;
-  const Steps s = steps_of(source.warp, plane, u_ + 0.5, v_ + 0.5);
+  Steps s;
+  if (!place(source, plane, s)) return out;
   const Eigen::Vector3d& parallax = source.warp.parallax;
   alignas(32) std::array<float, kMostSamples> value, slope;
   const CubicSamples samples{

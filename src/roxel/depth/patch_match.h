@@ -54,8 +54,17 @@ class Patch {
   bool usable() const { return usable_; }
   double variance() const { return variance_; }
   double sample_count() const { return sample_count_; }
-  /// Correlation in [-1, 1] with `source` under the plane; NaN where the patch leaves the image. Noise counts
-  /// as texture that does not correlate.
+  /// A homography's numerators and denominator about the patch's middle.
+  struct Steps {
+    float x0, xu, xv, y0, yu, yv, z0, zu, zv;
+  };
+  /// Where the plane puts the patch in `source`; whether that is inside the image.
+  bool place(const PatchSource& source, const PixelPlane& plane, Steps& steps) const;
+
+  /// Correlation in [-1, 1] with `source` at a place inside it. Noise counts as texture that does not
+  /// correlate.
+  float correlation(const PatchSource& source, const Steps& steps) const;
+  /// The same under the plane; NaN where the patch leaves the image.
   float correlation(const PatchSource& source, const PixelPlane& plane) const;
 
   /// Normal equations of the plane's three numbers from one view: gain and offset of light are solved for.
@@ -69,7 +78,6 @@ class Patch {
   Equations linearise(const PatchSource& source, const PixelPlane& plane) const;
 
  private:
-  bool corners_inside(const PatchSource& source, const PixelPlane& plane) const;
   int u_, v_;
   int radius_;
   int count_ = 0;

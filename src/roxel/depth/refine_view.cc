@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <Eigen/LU>
 
@@ -22,11 +23,12 @@ constexpr double kIndependentErrors = 0.25;  ///< the same, for how far a depth 
 constexpr double kVolumeStretch =
     1.5;  ///< of the variance that rests on the volume: its errors are alike nearby
 constexpr double kSlopeSigma = 0.6;      ///< tangent by which the volume's normals err
-constexpr double kSteepest = 6;          ///< tangent of the steepest plane
+constexpr double kSteepestPlane = 6;     ///< tangent of the steepest plane
 constexpr float kLeastAgreement = 0.4f;  ///< correlation of a view that counts in the least squares
 constexpr int kLeastSquaresRounds = 3;
-constexpr double kStill = 0.02;  ///< step, in deviations, that ends the least squares
-constexpr int kViewsAPixel = 6;  ///< of the sources, those that show the patch best
+constexpr double kStill = 0.02;      ///< step, in deviations, that ends the least squares
+constexpr double kSamePlane = 0.03;  ///< pixels that planes differ by in other views at most
+constexpr int kViewsAPixel = 6;      ///< of the sources, those that show the patch best
 
 /// Well mixed bits of a few numbers [Steele14].
 std::uint64_t mix(std::uint64_t x) {
@@ -136,7 +138,8 @@ class ViewRefinement {
     return seen;
   }
 
-  Hypothesis judge(const Patch& patch, const PixelPlane& plane, std::size_t i) const {
+  /// No cost where that would be `limit` or more: then not all views are looked at.
+  Hypothesis judge(const Patch& patch, const PixelPlane& plane, std::size_t i, float limit = kNoCost) const {
     Hypothesis out{plane, kNoCost, 0, 0};
     const PixelPlane& start = start_.planes[i];
     const float sigma = sigma_w(i);
@@ -145,27 +148,53 @@ class ViewRefinement {
     const float scale = focal_ / start.w;
     const float tilt_u = (plane.wu - start.wu) * scale, tilt_v = (plane.wv - start.wv) * scale;
     const float steep_u = plane.wu * scale, steep_v = plane.wv * scale;
-    if (steep_u * steep_u + steep_v * steep_v > kSteepest * kSteepest) return out;
-    std::array<std::pair<float, int>, 32> match;
+    if (steep_u * steep_u + steep_v * steep_v > kSteepestPlane * kSteepestPlane) return out;
+    const float prior = 0.5f * off * off + 0.5f * (tilt_u * tilt_u + tilt_v * tilt_v) /
+                                               static_cast<float>(kSlopeSigma * kSlopeSigma);
+    if (prior >= limit) return out;
+    std::array<Patch::Steps, 32> place;
+    std::array<int, 32> view;
     int count = 0;
     for (std::uint32_t left = visible_[i]; left != 0; left &= left - 1) {
-      const int s = std::countr_zero(left);
-      const float correlation = patch.correlation(sources_[s], plane);
-      if (std::isfinite(correlation)) match[count++] = {std::min(1 - correlation, kWorstMatch), s};
+      view[count] = std::countr_zero(left);
+      if (patch.place(sources_[view[count]], plane, place[count])) ++count;
     }
     if (count == 0) return out;
-    std::sort(match.begin(), match.begin() + count);
-    const int used = std::max(std::min(count, 2), (2 * count + 2) / 3);
-    float sum = 0;
-    for (int k = 0; k < used; ++k) {
-      sum += match[k].first;
-      if (1 - match[k].first > kLeastAgreement) out.agreeing |= 1u << match[k].second;
+    int used = used_of(count);
+    float weight = data_weight(patch) / static_cast<float>(used);
+    std::array<std::pair<float, int>, 32> match;  // ascending
+    float sum = 0;                                // of the best used - (count - looked at)
+    for (int k = 0; k < count; ++k) {
+      float correlation = patch.correlation(sources_[view[k]], place[k]);
+      while (!std::isfinite(correlation)) {  // it looks past what the photograph shows: as if not placed
+        if (--count == 0) return out;
+        used = used_of(count);
+        weight = data_weight(patch) / static_cast<float>(used);
+        if (k == count) break;
+        view[k] = view[count];
+        place[k] = place[count];
+        correlation = patch.correlation(sources_[view[k]], place[k]);
+      }
+      if (k == count) break;
+      const std::pair<float, int> next{std::min(1 - correlation, kWorstMatch), view[k]};
+      int at = k;
+      for (; at > 0 && next < match[at - 1]; --at) match[at] = match[at - 1];
+      match[at] = next;
+      sum = 0;
+      for (int best = 0; best < used - (count - k - 1); ++best) sum += match[best].first;
+      if (prior + weight * sum >= limit) return out;
     }
+    sum = 0;
+    for (int k = 0; k < used; ++k) sum += match[k].first;
+    for (int k = 0; k < used; ++k)
+      if (1 - match[k].first > kLeastAgreement) out.agreeing |= 1u << match[k].second;
     out.correlation = 1 - sum / static_cast<float>(used);
-    out.cost = data_weight(patch) * sum / static_cast<float>(used) + 0.5f * off * off +
-               0.5f * (tilt_u * tilt_u + tilt_v * tilt_v) / static_cast<float>(kSlopeSigma * kSlopeSigma);
+    out.cost = prior + weight * sum;
     return out;
   }
+
+  /// Of so many views that see a patch, the best that its cost is of.
+  static int used_of(int count) { return std::max(std::min(count, 2), (2 * count + 2) / 3); }
 
   /// Log-likelihood that a drop of the correlation by 1 costs.
   float data_weight(const Patch& patch) const {
@@ -208,8 +237,12 @@ class ViewRefinement {
     if (!std::isfinite(best_[i].cost)) return;
     const Patch patch = patch_at(x, y);
     Hypothesis best = best_[i];
+    const double shift = std::sqrt(squared_parallax(x, y, best.plane, visible_[i]).mean());
     const auto attempt = [&](const PixelPlane& plane) {
-      const Hypothesis next = judge(patch, plane, i);
+      const float slope = std::abs(plane.wu - best.plane.wu) + std::abs(plane.wv - best.plane.wv);
+      const float off = std::abs(plane.w - best.plane.w) + static_cast<float>(options_.patch.radius) * slope;
+      if (off * shift < kSamePlane) return;
+      const Hypothesis next = judge(patch, plane, i, best.cost);
       if (next.cost < best.cost) best = next;
     };
     static constexpr int kNear[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
@@ -282,45 +315,67 @@ class ViewRefinement {
     return 2 * views(plane) < views(start_.planes[i]);
   }
 
-  /// Of w, where points are off by pixel_sigma in each view.
-  double calibration_variance(int x, int y, const PixelPlane& plane, std::uint32_t agreeing) const {
+  /// Squares of how far points move in views, in pixels for a change of w by 1.
+  struct Parallax {
     double squares = 0;
     int count = 0;
-    for (std::uint32_t left = agreeing; left != 0; left &= left - 1, ++count) {
+    double mean() const { return count > 0 ? squares / count : 0; }
+  };
+
+  Parallax squared_parallax(int x, int y, const PixelPlane& plane, std::uint32_t views) const {
+    Parallax sum;
+    for (std::uint32_t left = views; left != 0; left &= left - 1, ++sum.count) {
       const PatchWarp& warp = sources_[std::countr_zero(left)].warp;
       const Eigen::Vector3d& m = warp.parallax;
       const Eigen::Vector3d h = warp.from_pixel * Eigen::Vector3d(x + 0.5, y + 0.5, 1) + plane.w * m;
-      squares += (m.head<2>() - h.head<2>() / h.z() * m.z()).squaredNorm() / (h.z() * h.z());
+      sum.squares += (m.head<2>() - h.head<2>() / h.z() * m.z()).squaredNorm() / (h.z() * h.z());
     }
-    return squares > 0 ? options_.pixel_sigma * options_.pixel_sigma * count / squares : 0;
+    return sum;
+  }
+
+  /// Of w, where points are off by pixel_sigma in each view.
+  double calibration_variance(int x, int y, const PixelPlane& plane, std::uint32_t agreeing) const {
+    const double mean = squared_parallax(x, y, plane, agreeing).mean();
+    return mean > 0 ? options_.pixel_sigma * options_.pixel_sigma / mean : 0;
   }
 
   void finish(int x, int y, std::size_t i, RefinedView& out) const {
     Hypothesis best = best_[i];
     const double prior = static_cast<double>(sigma_w(i)) * sigma_w(i);
     double variance = prior, shared = prior;
+    std::optional<Patch> patch;
+    Joint joint;
+    bool linearised = false;  // joint is that of the best plane
     if (std::isfinite(best.cost) && best.agreeing != 0) {
-      const Patch patch = patch_at(x, y);
+      patch.emplace(patch_at(x, y));
       const std::uint32_t agreeing = best.agreeing;
       PixelPlane plane = best.plane;
       for (int round = 0; round < kLeastSquaresRounds; ++round) {
-        const Joint joint = join(patch, plane, agreeing, i);
+        joint = join(*patch, plane, agreeing, i);
         const Eigen::Vector3d step = joint.a.ldlt().solve(joint.b);
         if (!step.allFinite()) break;
         const bool still = step[0] * step[0] * joint.a(0, 0) < kStill * kStill;
         plane.w += static_cast<float>(step[0]);
         plane.wu += static_cast<float>(step[1]);
         plane.wv += static_cast<float>(step[2]);
-        if (still) break;
+        if (still) {
+          linearised = true;
+          break;
+        }
       }
-      const Hypothesis polished = judge(patch, plane, i);
-      if (polished.cost <= best.cost * 1.02f + 0.1f) best = polished;
+      const Hypothesis polished = judge(*patch, plane, i);
+      if (polished.cost <= best.cost * 1.02f + 0.1f) {
+        linearised &= polished.agreeing == best.agreeing;
+        best = polished;
+      } else {
+        linearised = false;
+      }
       if (contradicted(x, y, i, best.plane)) best.plane = start_.planes[i], best.correlation = 0;
     }
     if (best.correlation > 0) {
-      const Patch patch = patch_at(x, y);
+      if (!patch) patch.emplace(patch_at(x, y));
+      if (!linearised) joint = join(*patch, best.plane, best.agreeing, i);
       const std::uint32_t agreeing = best.agreeing;
-      const Joint joint = join(patch, best.plane, agreeing, i);
       const double matched = joint.a.inverse()(0, 0);
       const double from_volume = std::min(1.0, matched / prior);
       const double calibration = calibration_variance(x, y, best.plane, agreeing);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <numbers>
 
 #include "roxel/depth/agree_views.h"
@@ -73,6 +74,17 @@ TEST_F(RefineView, LightThatDiffersBetweenPhotographsDoesNotMatter) {
   const double a = errors_of(as_it_is.planes, as_it_is.variance, view_.camera, 6).median;
   const double b = errors_of(dimmed.planes, dimmed.variance, view_.camera, 6).median;
   EXPECT_NEAR(a, b, 3e-4);
+}
+
+// Photographs that were straightened end in pixels that show nothing.
+TEST_F(RefineView, AViewThatShowsNothingThereLeavesTheOthersToDecide) {
+  for (MatchView& blind : sources_) {
+    const Image seen = blind.luma;
+    std::fill(blind.luma.data().begin(), blind.luma.data().end(), std::numeric_limits<float>::quiet_NaN());
+    const RefinedView refined = refine();
+    blind.luma = seen;
+    EXPECT_LT(errors_of(refined.planes, refined.variance, view_.camera, 6).median, 0.004);
+  }
 }
 
 TEST_F(RefineView, IsTheSameForAnyNumberOfThreads) {

@@ -2,6 +2,7 @@
 /// Fewer passes to the same place: EM creeps along where few rays tell voxels apart (docs/passes.md).
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace roxel {
@@ -13,6 +14,12 @@ enum class Accelerate { kBoth, kFalling };  ///< which steps: of all opacities, 
 /// pass, so it serves one level of one reconstruction. Different slots may be used from several threads.
 class Acceleration {
  public:
+  /// A voxel's last step of log tau.
+  struct Step {
+    float em = 0;    ///< what EM said
+    float made = 0;  ///< what was done
+  };
+
   /// No step is made longer than `limit` times itself; 1 changes nothing.
   Acceleration(std::uint32_t slot_count, double limit, Accelerate which = Accelerate::kBoth)
       : limit_(limit), which_(which), last_(limit > 1 ? slot_count : 0) {}
@@ -22,15 +29,15 @@ class Acceleration {
   /// longer than 1 + kPerEvidence (1 / prior_share - 1).
   double operator()(std::uint32_t slot, double before, double em, double prior_share);
 
+  /// What is remembered, one a slot or empty: to go on later where this one stands.
+  const std::vector<Step>& memory() const { return last_; }
+  void recall(std::vector<Step> memory) { last_ = std::move(memory); }
+
  private:
   static constexpr double kFirst = 2;        ///< times its length: the first step, before there is a secant
   static constexpr double kFarthest = 2.3;   ///< of log tau, unless EM itself goes farther
   static constexpr double kPerEvidence = 2;  ///< measured on head and dtu-scan24: 4 oscillates
 
-  struct Step {
-    float em = 0;    ///< what EM said, in log tau
-    float made = 0;  ///< what was done
-  };
   double limit_;
   Accelerate which_;
   std::vector<Step> last_;

@@ -1,10 +1,13 @@
 #include "roxel/infer/evidence.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <thread>
 
 #include "roxel/base/error.h"
+#include "roxel/base/kernel.h"
 #include "roxel/base/parallel.h"
 
 namespace roxel {
@@ -14,7 +17,26 @@ namespace {
 constexpr float kLargestColor = 1023.0f;
 constexpr float kLargestOpacitySum = 1 << 20;
 
-std::int64_t fixed(double value, double unit) { return std::llrint(value * unit); }
+static_assert(sizeof(VoxelColor) == 10 * sizeof(float), "as the first ten numbers of VoxelScratch");
+
+/// The nearest whole number of value * unit, below 2^51. What is added leaves no room for fractions: as plain
+/// arithmetic it vectorises.
+inline __attribute__((always_inline)) std::int64_t fixed(double value, double unit) {
+  constexpr double kNoFractions = 0x1.8p52;
+  return std::bit_cast<std::int64_t>(value * unit + kNoFractions) - std::bit_cast<std::int64_t>(kNoFractions);
+}
+
+/// capped_color of a voxel with evidence.
+inline __attribute__((always_inline)) void cap_color(const VoxelScratch& voxel, ColorTotals& totals) {
+  const double weight = voxel.evidence;
+  const double scale = std::min(1.0, weight) / weight;
+  totals[0] = fixed(weight * scale, kColorUnit);
+  const auto bounded = [scale](float sum, double limit) {
+    return fixed(std::clamp(sum * scale, -limit, limit), kColorUnit);
+  };
+  for (int c = 0; c < 3; ++c) totals[1 + c] = bounded(voxel.mean[c], kLargestColor);
+  for (int c = 0; c < 6; ++c) totals[4 + c] = bounded(voxel.cov[c], kLargestColor * kLargestColor);
+}
 
 /// Whether no principal minor of the covariance (xx, yy, zz, xy, xz, yz) is negative.
 bool semi_definite(const double s[6]) {
@@ -31,6 +53,61 @@ void make_semi_definite(double moment, double s[6]) {
   for (double lost = 1e-7 * moment; !semi_definite(s) && lost < moment; lost *= 4)
     for (int c = 0; c < 3; ++c) s[c] += lost;
   if (!semi_definite(s)) s[3] = s[4] = s[5] = 0;
+}
+
+inline __attribute__((always_inline)) void color_of_sums(const ColorTotals& totals, float mean[3],
+                                                         float cov[6], float& weight) {
+  weight = static_cast<float>(totals[0] / kColorUnit);
+  if (totals[0] <= 0) {
+    std::fill(mean, mean + 3, 0.0f);
+    std::fill(cov, cov + 6, 0.0f);
+    weight = 0;
+    return;
+  }
+  const double inverse = 1.0 / static_cast<double>(totals[0]);
+  double m[3], s[6];
+  for (int c = 0; c < 3; ++c) m[c] = totals[1 + c] * inverse;
+  for (int c = 0; c < 6; ++c) s[c] = totals[4 + c] * inverse;
+  s[0] = std::max(0.0, s[0] - m[0] * m[0]);
+  s[1] = std::max(0.0, s[1] - m[1] * m[1]);
+  s[2] = std::max(0.0, s[2] - m[2] * m[2]);
+  s[3] -= m[0] * m[1];
+  s[4] -= m[0] * m[2];
+  s[5] -= m[1] * m[2];
+  make_semi_definite(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + s[0] + s[1] + s[2], s);
+  for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(m[c]);
+  for (int c = 0; c < 6; ++c) cov[c] = static_cast<float>(s[c]);
+}
+
+/// Adds the capped colours of a brick's voxels to their totals.
+ROXEL_KERNEL void add_colors(const VoxelScratch* voxels, std::uint32_t count, ColorTotals* totals) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (voxels[i].evidence <= 0) continue;
+    ColorTotals own;
+    cap_color(voxels[i], own);
+    for (int c = 0; c < 10; ++c) totals[i][c] += own[c];
+  }
+}
+
+ROXEL_KERNEL void add_opacities(const VoxelScratch* voxels, std::uint32_t count, OpacityTotals* totals) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const float sums[3] = {voxels[i].hits, voxels[i].exposure, voxels[i].looked};
+    for (int k = 0; k < 3; ++k)
+      totals[i][k] += fixed(sums[k] < kLargestOpacitySum ? sums[k] : kLargestOpacitySum, kOpacityUnit);
+  }
+}
+
+ROXEL_KERNEL void make_colors(const ColorTotals* totals, std::int64_t count, VoxelColor* colors) {
+  for (std::int64_t i = 0; i < count; ++i)
+    color_of_sums(totals[i], colors[i].mean, colors[i].cov, colors[i].evidence);
+}
+
+/// Turns a voxel's own sums into what the other nodes say: the totals less the voxel's own.
+ROXEL_KERNEL void leave_out_own(const ColorTotals& totals, VoxelScratch& voxel) {
+  ColorTotals others, own;
+  cap_color(voxel, own);
+  for (int c = 0; c < 10; ++c) others[c] = totals[c] - own[c];
+  color_of_sums(others, voxel.mean, voxel.cov, voxel.evidence);
 }
 
 template <class Visit>
@@ -63,24 +140,13 @@ void NodeScratch::set_up_brick(std::uint32_t number) {
 
 void NodeScratch::look_up(std::uint32_t slot, VoxelScratch& voxel) const {
   if (!colors_) return color_of(totals_[slot], voxel.mean, voxel.cov, voxel.evidence);
-  const VoxelColor& color = colors_[slot];
-  std::copy(color.mean, color.mean + 3, voxel.mean);
-  std::copy(color.cov, color.cov + 6, voxel.cov);
-  voxel.evidence = color.evidence;
+  std::memcpy(static_cast<void*>(&voxel), &colors_[slot], sizeof(VoxelColor));
 }
 
 OwnColors::Entry OwnColors::Entry::of(std::uint32_t slot, const VoxelScratch& voxel) {
-  Entry entry{slot, {}, {}, voxel.evidence};
-  std::copy(voxel.mean, voxel.mean + 3, entry.mean);
-  std::copy(voxel.cov, voxel.cov + 6, entry.cov);
+  Entry entry{slot, {}};
+  std::memcpy(&entry.color, static_cast<const void*>(&voxel), sizeof(VoxelColor));
   return entry;
-}
-
-/// What the other nodes say: the totals less the node's own.
-void NodeScratch::leave_out(const ColorTotals& own, std::uint32_t slot, VoxelScratch& voxel) const {
-  ColorTotals others = totals_[slot];
-  for (int c = 0; c < 10; ++c) others[c] -= own[c];
-  color_of(others, voxel.mean, voxel.cov, voxel.evidence);
 }
 
 void NodeScratch::compare_with(const std::vector<ColorTotals>& totals,
@@ -91,7 +157,7 @@ void NodeScratch::compare_with(const std::vector<ColorTotals>& totals,
     for (std::uint32_t slot = begin; slot < end; ++slot) {
       VoxelScratch& voxel = voxels_[slot];
       if (voxel.evidence > 0) {
-        leave_out(capped_color(voxel), slot, voxel);
+        leave_out_own(totals_[slot], voxel);
       } else {
         look_up(slot, voxel);
       }
@@ -108,10 +174,8 @@ void NodeScratch::compare_with(const std::vector<ColorTotals>& totals, const std
     enter(part.brick);
     for (std::uint32_t i = 0; i < part.count; ++i, ++entry) {
       VoxelScratch& voxel = voxels_[entry->slot];
-      std::copy(entry->mean, entry->mean + 3, voxel.mean);
-      std::copy(entry->cov, entry->cov + 6, voxel.cov);
-      voxel.evidence = entry->evidence;
-      leave_out(capped_color(voxel), entry->slot, voxel);
+      std::memcpy(static_cast<void*>(&voxel), &entry->color, sizeof(VoxelColor));
+      leave_out_own(totals_[entry->slot], voxel);
     }
   }
 }
@@ -123,17 +187,16 @@ void NodeScratch::reset() {
   colors_ = nullptr;
 }
 
+void NodeScratch::reset(const LatticeStack& stack, const std::vector<float>& tau) {
+  ROXEL_CHECK(stack.brick_count() == entered_.size());
+  reset();
+  stack_ = &stack;
+  tau_ = tau.data();
+}
+
 ColorTotals capped_color(const VoxelScratch& voxel) {
   ColorTotals totals{};
-  const double weight = voxel.evidence;
-  if (weight <= 0) return totals;
-  const double scale = std::min(1.0, weight) / weight;
-  const auto bounded = [](double value, double limit) { return std::clamp(value, -limit, limit); };
-  totals[0] = fixed(weight * scale, kColorUnit);
-  for (int c = 0; c < 3; ++c)
-    totals[1 + c] = fixed(bounded(voxel.mean[c] * scale, kLargestColor), kColorUnit);
-  for (int c = 0; c < 6; ++c)
-    totals[4 + c] = fixed(bounded(voxel.cov[c] * scale, kLargestColor * kLargestColor), kColorUnit);
+  if (voxel.evidence > 0) cap_color(voxel, totals);
   return totals;
 }
 
@@ -161,64 +224,39 @@ void Totals::add_color(const LatticeStack& stack, const NodeScratch& node, OwnCo
     own->entries.reserve(entered);
   }
   for_each_entered_slot(stack, node, [&](std::uint32_t brick, std::uint32_t begin, std::uint32_t end) {
-    const BrickLock lock(*this, brick);
-    std::uint32_t count = 0;
-    for (std::uint32_t slot = begin; slot < end; ++slot) {
-      const VoxelScratch& voxel = node[slot];
-      if (voxel.evidence <= 0) continue;
-      const ColorTotals sums = capped_color(voxel);
-      for (int c = 0; c < 10; ++c) color[slot][c] += sums[c];
-      if (own) own->entries.push_back(OwnColors::Entry::of(slot, voxel));
-      ++count;
+    {
+      const BrickLock lock(*this, brick);
+      add_colors(&node[begin], end - begin, &color[begin]);
     }
-    if (own && count > 0) own->bricks.push_back({brick, count});
+    if (!own) return;
+    const std::size_t before = own->entries.size();
+    for (std::uint32_t slot = begin; slot < end; ++slot)
+      if (node[slot].evidence > 0) own->entries.push_back(OwnColors::Entry::of(slot, node[slot]));
+    const std::size_t count = own->entries.size() - before;
+    if (count > 0) own->bricks.push_back({brick, static_cast<std::uint32_t>(count)});
   });
 }
 
 void Totals::add_opacity(const LatticeStack& stack, const NodeScratch& node) {
-  const auto saturated = [](float value) { return fixed(std::min(value, kLargestOpacitySum), kOpacityUnit); };
   for_each_entered_slot(stack, node, [&](std::uint32_t brick, std::uint32_t begin, std::uint32_t end) {
     const BrickLock lock(*this, brick);
-    for (std::uint32_t slot = begin; slot < end; ++slot) {
-      const VoxelScratch& voxel = node[slot];
-      if (voxel.hits == 0 && voxel.exposure == 0 && voxel.looked == 0) continue;
-      opacity[slot][0] += saturated(voxel.hits);
-      opacity[slot][1] += saturated(voxel.exposure);
-      opacity[slot][2] += saturated(voxel.looked);
-    }
+    add_opacities(&node[begin], end - begin, &opacity[begin]);
   });
 }
 
 void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& weight) {
-  weight = static_cast<float>(totals[0] / kColorUnit);
-  if (totals[0] <= 0) {
-    std::fill(mean, mean + 3, 0.0f);
-    std::fill(cov, cov + 6, 0.0f);
-    weight = 0;
-    return;
-  }
-  const double inverse = 1.0 / static_cast<double>(totals[0]);
-  double m[3], s[6];
-  for (int c = 0; c < 3; ++c) m[c] = totals[1 + c] * inverse;
-  for (int c = 0; c < 6; ++c) s[c] = totals[4 + c] * inverse;
-  s[0] = std::max(0.0, s[0] - m[0] * m[0]);
-  s[1] = std::max(0.0, s[1] - m[1] * m[1]);
-  s[2] = std::max(0.0, s[2] - m[2] * m[2]);
-  s[3] -= m[0] * m[1];
-  s[4] -= m[0] * m[2];
-  s[5] -= m[1] * m[2];
-  make_semi_definite(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + s[0] + s[1] + s[2], s);
-  for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(m[c]);
-  for (int c = 0; c < 6; ++c) cov[c] = static_cast<float>(s[c]);
+  VoxelColor color;
+  make_colors(&totals, 1, &color);
+  std::copy(color.mean, color.mean + 3, mean);
+  std::copy(color.cov, color.cov + 6, cov);
+  weight = color.evidence;
 }
 
-std::vector<VoxelColor> colors_of(const std::vector<ColorTotals>& totals, int threads) {
-  std::vector<VoxelColor> colors(totals.size());
+void colors_of(const std::vector<ColorTotals>& totals, int threads, std::vector<VoxelColor>& colors) {
+  colors.resize(totals.size());
   parallel_for_blocks(totals.size(), 1 << 14, threads, [&](std::int64_t begin, std::int64_t end, int) {
-    for (std::int64_t slot = begin; slot < end; ++slot)
-      color_of(totals[slot], colors[slot].mean, colors[slot].cov, colors[slot].evidence);
+    make_colors(&totals[begin], end - begin, &colors[begin]);
   });
-  return colors;
 }
 
 }  // namespace roxel

@@ -53,9 +53,7 @@ struct OwnColors {
   };
   struct Entry {
     std::uint32_t slot;
-    float mean[3];
-    float cov[6];
-    float evidence;
+    VoxelColor color;  ///< sums of w x and w x x', and w
     static Entry of(std::uint32_t slot, const VoxelScratch& voxel);
   };
   std::vector<BrickPart> bricks;
@@ -91,11 +89,12 @@ class NodeScratch {
   const std::vector<std::uint32_t>& entered_bricks() const { return order_; }
   /// Forgets the node.
   void reset();
+  /// The same, and goes over to another pass over a volume of the same voxels.
+  void reset(const LatticeStack& stack, const std::vector<float>& tau);
 
  private:
   void set_up_brick(std::uint32_t brick);
   void look_up(std::uint32_t slot, VoxelScratch& voxel) const;
-  void leave_out(const ColorTotals& own, std::uint32_t slot, VoxelScratch& voxel) const;
 
   const LatticeStack* stack_;
   const float* tau_;
@@ -131,6 +130,6 @@ class Totals {
 
 /// Mean, covariance and weight of fixed-point colour sums; all zero without weight.
 void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& weight);
-std::vector<VoxelColor> colors_of(const std::vector<ColorTotals>& totals, int threads);
+void colors_of(const std::vector<ColorTotals>& totals, int threads, std::vector<VoxelColor>& colors);
 
 }  // namespace roxel

@@ -20,32 +20,14 @@ bool OpacityPackets::serves(const MarchOptions& options) {
 void OpacityPackets::tile(const ViewInSight& in_sight, const Tile& tile) {
   const SampleView& view = in_sight.view;
   samples_.clear();
+  roots_ = 0;
   packets_.clear();
   levels_.clear();
   rows_.clear();
-  // Blocks of 4 x 2 make packets of close neighbours.
-  for (int y = tile.y0; y < tile.y1; y += 2)
-    for (int x = tile.x0; x < tile.x1; x += 4)
-      for (int i = 0; i < kLanes; ++i)
-        if (x + i % 4 < tile.x1 && y + i / 4 < tile.y1)
-          add(view, {view.plan.root_level, x + i % 4, y + i / 4});
-  const std::size_t roots = samples_.size();
-
-  double begin = view.plan.range.begin;
-  std::size_t first = 0;
-  for (int level = view.plan.root_level; first < samples_.size(); --level) {
-    const Stretch range = served_range(view, {level, 0, 0}, begin);
-    const std::size_t end = samples_.size();
-    march_level(in_sight, first, range);
-    const bool last = range.end >= view.plan.range.end || level == view.plan.finest_level;
-    for (std::size_t i = first; i < end; ++i) divide(view, i, last);
-    levels_.push_back({end, packets_.size()});
-    begin = std::max(range.begin, range.end);
-    first = end;
-  }
+  march_tile(*this, in_sight, tile);
 
   look_behind(view);
-  for (std::size_t i = 0; i < roots; ++i) {
+  for (std::size_t i = 0; i < roots_; ++i) {
     counts.observation_weight += samples_[i].weight;
     counts.log_likelihood += samples_[i].weight * std::log(std::max(samples_[i].z, kLeast));
     samples_[i].reach = 1;
@@ -58,34 +40,21 @@ RegionStats OpacityPackets::stats_of(const SampleView& view, const Sample& sampl
 }
 
 /// Adds the region's sample, unless it has no valid pixels.
-void OpacityPackets::add(const SampleView& view, const Region& region) {
+void OpacityPackets::add(const SampleView& view, const Region& region, int parent) {
   const float valid = view.pyramid->valid(region.level, region.x, region.y);
-  if (valid > 0) samples_.push_back({region, observation_weight(view, region, valid)});
+  if (valid <= 0) return;
+  samples_.push_back({region, observation_weight(view, region, valid)});
+  if (parent < 0) roots_ = samples_.size();
 }
 
-/// Marches all samples from `begin` on over the range that their level serves.
-void OpacityPackets::march_level(const ViewInSight& in_sight, std::size_t begin, Stretch range) {
-  if (range.end <= range.begin) return;
-  Packet packet;
-  for (std::size_t i = begin; i < samples_.size(); ++i) {
-    const Eigen::Vector2d at = region_centre(in_sight.view, samples_[i].region);
-    const Stretch* sight = in_sight.sight.within(at.x(), at.y(), range);
-    if (!sight) continue;
-    march_.begin(packet.count, in_sight.view.camera.ray(at.x(), at.y()), range, sight);
-    packet.sample[packet.count++] = static_cast<int>(i);
-    if (packet.count == kLanes) march_packet(in_sight.view, packet);
-  }
-  if (packet.count > 0) march_packet(in_sight.view, packet);
-}
-
-/// Marches the rays begun; the packet is kept with its rows, and is empty again.
-void OpacityPackets::march_packet(const SampleView& view, Packet& packet) {
+/// Marches the rays begun, and keeps the packet with its rows.
+void OpacityPackets::march(const SampleView& view, const SamplePacket& begun) {
+  Packet packet{begun, rows_.size(), 0};
   LaneTerms terms;
   for (int lane = 0; lane < kLanes; ++lane) {
     const Sample& sample = samples_[packet.sample[std::min(lane, packet.count - 1)]];
     terms.set(lane, sample_terms(stats_of(view, sample), options_.model));
   }
-  packet.first_row = rows_.size();
   const PacketSegments segments = march_.march(terms, rows_);
   packet.end_row = rows_.size();
   for (int lane = 0; lane < packet.count; ++lane) {
@@ -94,20 +63,18 @@ void OpacityPackets::march_packet(const SampleView& view, Packet& packet) {
   }
   counts.rays += packet.count;
   packets_.push_back(packet);
-  packet.count = 0;
 }
 
-/// Adds the four children, quarter-weight observations of what lies behind, unless there is nothing more.
-void OpacityPackets::divide(const SampleView& view, std::size_t index, bool last) {
+/// Children are quarter-weight observations of what lies behind, unless there is nothing more.
+bool OpacityPackets::divides(const SampleView&, std::size_t index, bool last) {
   Sample& sample = samples_[index];
   sample.ends = last || sample.own.transmittance < SegmentMarch::kNegligible * sample.own.likelihood;
-  if (sample.ends) return;
-  const Region region = sample.region;
-  const std::size_t first = samples_.size();
-  for (int c = 0; c < 4; ++c)
-    if (const Region child = region.child(c); inside(view, child)) add(view, child);
-  samples_[index].first_child = static_cast<int>(first);
-  samples_[index].end_child = static_cast<int>(samples_.size());
+  return !sample.ends;
+}
+
+void OpacityPackets::divided(std::size_t sample, std::size_t first_child, std::size_t end_child) {
+  samples_[sample].first_child = static_cast<int>(first_child);
+  samples_[sample].end_child = static_cast<int>(end_child);
 }
 
 /// Likelihoods from the finest samples up: behind = prod Z_c^{share}.

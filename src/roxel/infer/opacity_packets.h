@@ -4,9 +4,9 @@
 
 #include <vector>
 
+#include "roxel/infer/packet_levels.h"
 #include "roxel/infer/packet_march.h"
 #include "roxel/infer/passes.h"
-#include "roxel/infer/tiles.h"
 
 namespace roxel {
 
@@ -36,9 +36,7 @@ class OpacityPackets {
     int first_child = 0, end_child = 0;
   };
   /// Samples that were marched together, and their steps.
-  struct Packet {
-    int count = 0;
-    int sample[kLanes];
+  struct Packet : SamplePacket {
     std::size_t first_row, end_row;
   };
   /// Samples and packets of one pyramid level.
@@ -46,11 +44,19 @@ class OpacityPackets {
     std::size_t end_sample, end_packet;
   };
 
+  template <class March>
+  friend void march_tile(March& march, const ViewInSight& in_sight, const Tile& tile);
+  const std::vector<Sample>& samples() const { return samples_; }
+  void add(const SampleView& view, const Region& region, int parent);
+  void begin(int lane, const Ray& ray, Stretch range, const Stretch* sight) {
+    march_.begin(lane, ray, range, sight);
+  }
+  void march(const SampleView& view, const SamplePacket& packet);
+  bool divides(const SampleView& view, std::size_t sample, bool last);
+  void divided(std::size_t sample, std::size_t first_child, std::size_t end_child);
+  void level_done(std::size_t end_sample) { levels_.push_back({end_sample, packets_.size()}); }
+
   static RegionStats stats_of(const SampleView& view, const Sample& sample);
-  void add(const SampleView& view, const Region& region);
-  void march_level(const ViewInSight& in_sight, std::size_t begin, Stretch range);
-  void march_packet(const SampleView& view, Packet& packet);
-  void divide(const SampleView& view, std::size_t index, bool last);
   void look_behind(const SampleView& view);
   void distribute();
   void give_out(const Packet& packet);
@@ -59,6 +65,7 @@ class OpacityPackets {
   const MarchOptions& options_;
   PacketMarch march_;
   std::vector<Sample> samples_;
+  std::size_t roots_ = 0;  ///< samples that are nobody's children: the first ones
   std::vector<Packet> packets_;
   std::vector<Level> levels_;
   EvaluatedRows rows_;

@@ -166,6 +166,32 @@ TEST(RunPass, KeepingOwnColorsChangesNoResult) {
   }
 }
 
+// What passes leave in the memory that they share says nothing to the next one: whatever was kept, and with
+// other samples in between.
+TEST(RunPass, SharedMemoryChangesNoResult) {
+  std::mt19937 random(6);
+  const Volume start = random_volume({2, 2, 2}, 0.6, 0.01, 0.4, random);
+  const std::vector<SampleNode> nodes = nodes_around(start, 4, 24, 1, random);
+  const std::vector<SampleNode> others = nodes_around(start, 4, 12, 0, random);
+  PassOptions options;
+  options.kept_color_bytes = 100000;  // of some nodes
+  const auto after = [&](PassMemory* memory) {
+    Volume volume = start;
+    for (const std::vector<SampleNode>& samples : {nodes, others, nodes})
+      run_pass(samples, options, RunContext(2), nullptr, volume, nullptr, memory);
+    return volume;
+  };
+  const Volume apart = after(nullptr);
+  PassMemory memory;
+  for (int round = 0; round < 2; ++round) {
+    const Volume shared = after(&memory);
+    EXPECT_EQ(shared.tau, apart.tau);
+    EXPECT_EQ(shared.support, apart.support);
+    EXPECT_EQ(shared.color_mean, apart.color_mean);
+    EXPECT_EQ(shared.color_cov, apart.color_cov);
+  }
+}
+
 // Opaque volumes: rays stop early, so that what they leave out is below SegmentMarch::kNegligible of a ray.
 TEST(RunPass, OpaqueVolumesDifferByTheEarlyStopAtMost) {
   std::mt19937 random(10);

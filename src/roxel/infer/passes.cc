@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "roxel/infer/color_packets.h"
 #include "roxel/infer/opacity_packets.h"
 
 namespace roxel {
@@ -15,93 +16,6 @@ PassCounts& PassCounts::operator+=(const PassCounts& other) {
 }
 
 namespace {
-
-class ColorMarch {
- public:
-  ColorMarch(const LatticeStack& stack, const MarchOptions& options, bool everywhere, NodeScratch& scratch)
-      : stack_(stack),
-        model_(options.model),
-        background_(options.background),
-        everywhere_(everywhere),
-        spent_(options.rule == UpdateRule::kRoxels ? kSpentRoxels : kSpent),
-        scratch_(scratch) {}
-
-  void march(const ViewInSight& in_sight, const Region& region, double begin, float transmittance) {
-    const SampleView& view = in_sight.view;
-    const RegionStats sample = view.pyramid->at(region.level, region.x, region.y);
-    if (sample.valid <= 0 || sample.foreground <= 0) return;
-    const Stretch range = served_range(view, region, begin);
-    if (range.end > range.begin) transmittance = deposit(in_sight, region, sample, range, transmittance);
-    if (range.end >= view.plan.range.end || region.level == view.plan.finest_level) return;
-    if (!everywhere_ && transmittance < spent_) return;
-    for (int c = 0; c < 4; ++c)
-      if (const Region child = region.child(c); inside(view, child))
-        march(in_sight, child, std::max(range.begin, range.end), transmittance);
-  }
-
-  PassCounts counts;
-
- private:
-  /// Transmittance below which what lies behind is not coloured. The roxels rule gives hidden voxels opacity
-  /// as well, so that their colours count for more.
-  static constexpr float kSpent = 1e-3f, kSpentRoxels = 1e-5f;
-  static constexpr float kNothing = 1e-6f;  ///< weights that cannot matter against evidence_half
-
-  float deposit(const ViewInSight& in_sight, const Region& region, const RegionStats& sample, Stretch range,
-                float transmittance) {
-    const SampleView& view = in_sight.view;
-    const Eigen::Vector2d at = region_centre(view, region);
-    const Stretch* sight = in_sight.sight.within(at.x(), at.y(), range);
-    if (!sight) return transmittance;
-    const float weight =
-        observation_weight(view, region, sample) * sample.foreground *
-        (1 - (background_.kind == BackgroundKind::kKnown ? known_background_share(background_, model_, sample)
-                                                         : 0.0f));
-    float second[6];
-    for (int c = 0; c < 3; ++c) second[c] = sample.cov[c] + sample.mean[c] * sample.mean[c];
-    second[3] = sample.cov[3] + sample.mean[0] * sample.mean[1];
-    second[4] = sample.cov[4] + sample.mean[0] * sample.mean[2];
-    second[5] = sample.cov[5] + sample.mean[1] * sample.mean[2];
-    ++counts.rays;
-    stack_.walk_chunks(
-        view.camera.ray(at.x(), at.y()), range, sight, chunk_,
-        [&](std::uint32_t brick) { scratch_.enter(brick); },
-        [&](const StepChunk& chunk) {
-          counts.steps += chunk.count;
-          transmittance = add_to_voxels(chunk, sample.mean, second, weight, transmittance);
-          return everywhere_ || transmittance > spent_;
-        });
-    return transmittance;
-  }
-
-  float add_to_voxels(const StepChunk& chunk, const float mean[3], const float second[6], float weight,
-                      float transmittance) {
-    for (int i = 0; i < chunk.count; ++i) __builtin_prefetch(&scratch_[chunk.slot[i]], 1);
-    for (int i = 0; i < chunk.count; ++i) {
-      VoxelScratch& voxel = scratch_[chunk.slot[i]];
-      float responsibility = 1;
-      if (!everywhere_) {
-        const float a = one_minus_exp(voxel.tau * chunk.length[i]);
-        responsibility = a * transmittance;
-        transmittance *= 1 - a;
-      }
-      const float w = responsibility * chunk.weight[i] * weight;
-      if (w < kNothing) continue;
-      voxel.evidence += w;
-      for (int c = 0; c < 3; ++c) voxel.mean[c] += w * mean[c];
-      for (int c = 0; c < 6; ++c) voxel.cov[c] += w * second[c];
-    }
-    return transmittance;
-  }
-
-  const LatticeStack& stack_;
-  const MatchModel& model_;
-  const Background& background_;
-  bool everywhere_;
-  float spent_;
-  NodeScratch& scratch_;
-  StepChunk chunk_;
-};
 
 /// One sample of the tree that a root sample divides into: its own stretch of steps and what its children
 /// add.
@@ -265,11 +179,10 @@ class OpacityMarch {
 
 PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
                        bool everywhere, const RunContext& context, NodeScratch& scratch) {
-  ColorMarch march(stack, options, everywhere, scratch);
-  for_each_root(stack, node, context, [&](const ViewInSight& in_sight, const Region& region) {
-    march.march(in_sight, region, in_sight.view.plan.range.begin, 1.0f);
-  });
-  return march.counts;
+  ColorPackets packets(stack, options, everywhere, scratch);
+  for_each_tile(stack, node, context,
+                [&](const ViewInSight& in_sight, const Tile& tile) { packets.tile(in_sight, tile); });
+  return packets.counts;
 }
 
 PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,

@@ -14,7 +14,7 @@ enum class UpdateRule {
 /// Sums over rays that a pass reports; counts and sums of sums, all exact or folded in a fixed order.
 struct PassCounts {
   std::int64_t rays = 0;          ///< samples marched
-  std::int64_t steps = 0;         ///< existing voxels crossed with positive weight
+  std::int64_t steps = 0;         ///< existing voxels crossed
   double log_likelihood = 0;      ///< sum over root samples of weight * log Z (posterior rule)
   double observation_weight = 0;  ///< sum of the root samples' weights
 

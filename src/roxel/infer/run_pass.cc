@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 
 namespace roxel {
@@ -26,23 +27,6 @@ double thread_seconds() {
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
-
-/// Workers' scratch memory, made when a worker first needs it.
-class ScratchPool {
- public:
-  ScratchPool(const LatticeStack& stack, const std::vector<float>& tau, int workers)
-      : stack_(stack), tau_(tau), scratch_(workers) {}
-  NodeScratch& of(int worker) {
-    if (!scratch_[worker]) scratch_[worker] = std::make_unique<NodeScratch>(stack_, tau_);
-    scratch_[worker]->reset();
-    return *scratch_[worker];
-  }
-
- private:
-  const LatticeStack& stack_;
-  const std::vector<float>& tau_;
-  std::vector<std::unique_ptr<NodeScratch>> scratch_;
-};
 
 /// Big nodes first, so that no worker is left with one at the end.
 std::vector<int> by_size(const std::vector<SampleNode>& nodes) {
@@ -89,65 +73,95 @@ double log_prior(const Volume& volume, const std::vector<float>& prior_opacity, 
 
 PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode>& nodes,
                          const PassOptions& options, const RunContext& context, const PassProgress& progress,
-                         CollectedColors& colors) {
+                         CollectedColors& colors, PassMemory* memory) {
+  PassMemory own_memory;
+  PassMemory& used = memory ? *memory : own_memory;
+  used.set_workers(context.thread_count());
   colors.totals.clear_color();
-  ScratchPool pool(stack, stack.volume().tau, context.thread_count());
+  colors.kept.clear();
   const PassCounts counts = sum(for_each_node(nodes, context, progress, 0, 0.3, [&](int node, int worker) {
-    NodeScratch& scratch = pool.of(worker);
+    NodeScratch& scratch = used.scratch(worker, stack, stack.volume().tau);
     const PassCounts node_counts =
-        march_color(stack, nodes[node], options.opacity, options.everywhere, context, scratch);
-    OwnColors own;
-    const bool keep = options.predictive && colors.kept.has_room();
-    colors.totals.add_color(stack, scratch, keep ? &own : nullptr);
-    if (keep) colors.kept.keep(node, std::move(own));
+        march_color(stack, resident(nodes[node]), options.opacity, options.everywhere, context, scratch);
+    OwnColors* own = options.predictive ? colors.kept.room_for(node) : nullptr;
+    colors.totals.add_color(stack, scratch, own);
+    if (own) colors.kept.keep(node);
     return node_counts;
   }));
-  colors.of_totals = colors_of(colors.totals.color, context.thread_count());
+  colors_of(colors.totals.color, context.thread_count(), colors.of_totals);
   return counts;
 }
 
-void compare_with_others(const LatticeStack& stack, const std::vector<SampleNode>& nodes, std::size_t node,
+void compare_with_others(const LatticeStack& stack, const SampleNode& views, std::size_t node_idx,
                          const PassOptions& options, const CollectedColors& colors, const RunContext& context,
                          NodeScratch& scratch) {
-  const OwnColors* own = options.predictive ? colors.kept.of(node) : nullptr;
+  const OwnColors* own = options.predictive ? colors.kept.of(node_idx) : nullptr;
   if (own) return scratch.compare_with(colors.totals.color, &colors.of_totals, *own);
-  if (options.predictive)
-    march_color(stack, nodes[node], options.opacity, options.everywhere, context, scratch);
+  if (options.predictive) march_color(stack, views, options.opacity, options.everywhere, context, scratch);
   scratch.compare_with(colors.totals.color, &colors.of_totals);
 }
 
 KeptColors::KeptColors(std::size_t node_count, std::size_t limit_bytes)
-    : left_bytes_(static_cast<std::int64_t>(limit_bytes)), nodes_(node_count) {}
+    : limit_bytes_(static_cast<std::int64_t>(limit_bytes)), left_bytes_(limit_bytes_), nodes_(node_count) {}
 
-void KeptColors::keep(std::size_t node, OwnColors own) {
-  const std::int64_t bytes = static_cast<std::int64_t>(own.bytes());
-  if (left_bytes_.fetch_sub(bytes) < bytes) {
-    left_bytes_ += bytes;
-    return;
-  }
-  nodes_[node] = std::make_unique<OwnColors>(std::move(own));
+void KeptColors::clear() {
+  left_bytes_ = limit_bytes_;
+  for (Node& node : nodes_) node = {};  // or nodes that get no room next time would hold on to theirs
+}
+
+OwnColors* KeptColors::room_for(std::size_t node) {
+  if (left_bytes_ <= 0) return nullptr;
+  return &nodes_[node].colors;
+}
+
+void KeptColors::keep(std::size_t node) {
+  const std::int64_t bytes = static_cast<std::int64_t>(nodes_[node].colors.bytes());
+  nodes_[node].kept = left_bytes_.fetch_sub(bytes) >= bytes;
+  if (nodes_[node].kept) return;
+  left_bytes_ += bytes;
+  nodes_[node].colors = {};
+}
+
+CollectedColors& PassMemory::colors(std::uint32_t slot_count, std::size_t node_count,
+                                    std::size_t kept_bytes) {
+  if (!colors_) colors_ = std::make_unique<CollectedColors>(slot_count, node_count, kept_bytes);
+  ROXEL_CHECK(colors_->totals.color.size() == slot_count && colors_->kept.node_count() == node_count);
+  return *colors_;
+}
+
+void PassMemory::set_workers(int count) {
+  if (static_cast<int>(scratch_.size()) < count) scratch_.resize(count);
+}
+
+NodeScratch& PassMemory::scratch(int worker, const LatticeStack& stack, const std::vector<float>& tau) {
+  if (!scratch_[worker]) scratch_[worker] = std::make_unique<NodeScratch>(stack, tau);
+  scratch_[worker]->reset(stack, tau);
+  return *scratch_[worker];
 }
 
 PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,
                     const RunContext& context, const PassProgress& progress, Volume& volume,
-                    Acceleration* acceleration) {
+                    Acceleration* acceleration, PassMemory* memory) {
   PassReport report;
   const LatticeStack stack(volume);
-  CollectedColors colors(volume.slot_count(), nodes.size(), options.kept_color_bytes);
+  PassMemory own_memory;
+  PassMemory& used = memory ? *memory : own_memory;
+  CollectedColors& colors = used.colors(volume.slot_count(), nodes.size(), options.kept_color_bytes);
   Totals& totals = colors.totals;
 
   auto start = Clock::now();
-  report.color = collect_color(stack, nodes, options, context, progress, colors);
+  report.color = collect_color(stack, nodes, options, context, progress, colors, &used);
   report.color_seconds = seconds_since(start);
 
   start = Clock::now();
-  ScratchPool pool(stack, volume.tau, context.thread_count());
+  totals.clear_opacity();
   std::vector<double> march_seconds(context.thread_count(), 0.0);
   report.opacity = sum(for_each_node(nodes, context, progress, 0.3, 1, [&](int node, int worker) {
-    NodeScratch& scratch = pool.of(worker);
-    compare_with_others(stack, nodes, node, options, colors, context, scratch);
+    NodeScratch& scratch = used.scratch(worker, stack, volume.tau);
+    const SampleNode views = resident(nodes[node]);
+    compare_with_others(stack, views, node, options, colors, context, scratch);
     const double march_start = thread_seconds();
-    const PassCounts counts = march_opacity(stack, nodes[node], options.opacity, context, scratch);
+    const PassCounts counts = march_opacity(stack, views, options.opacity, context, scratch);
     march_seconds[worker] += thread_seconds() - march_start;
     totals.add_opacity(stack, scratch);
     return counts;

@@ -28,27 +28,30 @@ struct PassReport {
 /// Called after each node of each half of the pass with the share of the pass that is done, from any thread.
 using PassProgress = std::function<void(double fraction)>;
 
-/// Updates the volume. Nodes are worked on by whole workers in any order; totals are exact, so the result
-/// does not depend on the number of threads.
-PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,
-                    const RunContext& context, const PassProgress& progress, Volume& volume,
-                    Acceleration* acceleration = nullptr);
-
 /// Own colours of as many nodes as fit into a limit: those need not be marched for again in the second half
 /// of a pass. What is kept may depend on the order of arrival; no result does.
 class KeptColors {
  public:
   KeptColors(std::size_t node_count, std::size_t limit_bytes);
-  /// Called at most once a node; safe from several threads for different nodes.
-  void keep(std::size_t node, OwnColors own);
-  /// Whether anything more may be kept.
-  bool has_room() const { return left_bytes_ > 0; }
+  /// Forgets all colours.
+  void clear();
+  /// Where a node's colours may be put, empty, or null without room. Then say keep(node). Safe from several
+  /// threads for different nodes, at most once a node.
+  OwnColors* room_for(std::size_t node);
+  /// Keeps what was put there, unless it is more than there was room for.
+  void keep(std::size_t node);
+  std::size_t node_count() const { return nodes_.size(); }
   /// Null where the node's colours were not kept.
-  const OwnColors* of(std::size_t node) const { return nodes_[node].get(); }
+  const OwnColors* of(std::size_t node) const { return nodes_[node].kept ? &nodes_[node].colors : nullptr; }
 
  private:
+  struct Node {
+    bool kept = false;
+    OwnColors colors;
+  };
+  std::int64_t limit_bytes_;
   std::atomic<std::int64_t> left_bytes_;
-  std::vector<std::unique_ptr<OwnColors>> nodes_;
+  std::vector<Node> nodes_;
 };
 
 /// Colours that rays are compared with: those of all nodes, and what is kept of each node's own.
@@ -61,14 +64,40 @@ struct CollectedColors {
   std::vector<VoxelColor> of_totals;
 };
 
-/// Makes the scratch hold what the nodes other than nodes[node] say (all nodes without options.predictive).
-void compare_with_others(const LatticeStack& stack, const std::vector<SampleNode>& nodes, std::size_t node,
+/// Makes the scratch hold what the nodes other than number `node_idx` say (all nodes without
+/// options.predictive). `views` are that node's, in memory.
+void compare_with_others(const LatticeStack& stack, const SampleNode& views, std::size_t node_idx,
                          const PassOptions& options, const CollectedColors& colors, const RunContext& context,
                          NodeScratch& scratch);
+
+/// What passes over one volume and its nodes work in: kept from one to the next, it is not taken from the
+/// system and given back each time.
+class PassMemory {
+ public:
+  /// What was collected last, or room for it.
+  CollectedColors& colors(std::uint32_t slot_count, std::size_t node_count, std::size_t kept_bytes);
+  /// A worker's scratch, reset; made when the worker first needs it.
+  NodeScratch& scratch(int worker, const LatticeStack& stack, const std::vector<float>& tau);
+  /// Room for the scratch of so many workers.
+  void set_workers(int count);
+  /// Gives all of it back.
+  void release() { scratch_.clear(), colors_.reset(); }
+
+ private:
+  std::vector<std::unique_ptr<NodeScratch>> scratch_;
+  std::unique_ptr<CollectedColors> colors_;
+};
 
 /// The first half alone: the colours.
 PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode>& nodes,
                          const PassOptions& options, const RunContext& context, const PassProgress& progress,
-                         CollectedColors& colors);
+                         CollectedColors& colors, PassMemory* memory = nullptr);
+
+/// Updates the volume. Nodes whose pyramids are not in memory have them made in each half of the pass, one
+/// node a worker at once. Nodes are worked on by whole workers in any order; totals are exact, so the result
+/// does not depend on the number of threads. `memory`, where it is kept for the next pass, changes no result.
+PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& options,
+                    const RunContext& context, const PassProgress& progress, Volume& volume,
+                    Acceleration* acceleration = nullptr, PassMemory* memory = nullptr);
 
 }  // namespace roxel

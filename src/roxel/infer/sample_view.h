@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -13,7 +14,8 @@ namespace roxel {
 
 struct SampleView {
   PinholeCamera camera;
-  std::shared_ptr<const SamplePyramid> pyramid;
+  std::shared_ptr<const SamplePyramid> pyramid;  ///< null: made by make_pyramid whenever it is needed
+  std::function<std::shared_ptr<const SamplePyramid>()> make_pyramid = {};
   SamplePlan plan;
   SamplePlan draft_plan;  ///< the same with samples of twice the size, for passes that prepare others
   /// Observation weight of one pixel; a sample's weight is its usable area in pixels times this, so children
@@ -23,6 +25,19 @@ struct SampleView {
 
 /// The views of one capture node.
 using SampleNode = std::vector<SampleView>;
+
+/// The same with its pyramid in memory: what is marched.
+inline SampleView resident(SampleView view) {
+  if (!view.pyramid) view.pyramid = view.make_pyramid();
+  return view;
+}
+
+inline SampleNode resident(const SampleNode& node) {
+  SampleNode views;
+  views.reserve(node.size());
+  for (const SampleView& view : node) views.push_back(resident(view));
+  return views;
+}
 
 /// A square region of a view: column and row at a pyramid level.
 struct Region {

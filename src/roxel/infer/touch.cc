@@ -114,7 +114,7 @@ std::vector<Topology> reached_voxels(const std::vector<LatticeFrame>& frames,
     for (const SampleView& view : node) views.push_back(&view);
   Toucher toucher(boxes, frames, reached);
   parallel_for(views.size(), context.thread_count(), [&](std::int64_t v, int) {
-    const SampleView& view = *views[v];
+    const SampleView view = resident(*views[v]);
     const int level = view.plan.root_level;
     for (int y = 0; y < view.pyramid->height(level); ++y) {
       context.throw_if_cancelled();

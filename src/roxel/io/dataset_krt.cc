@@ -10,12 +10,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kNumbers = 21;
+constexpr std::size_t kKrtNumbers = 21;
 
 bool holds_krt(const fs::path& file) {
   if (fs::file_size(file) > 4096) return false;
   try {
-    return parse_number_file(file, read_whole_file(file), "number").size() == kNumbers;
+    return parse_number_file(file, read_whole_file(file), "number").size() == kKrtNumbers;
   } catch (const InvalidInput&) {
     return false;
   }
@@ -36,12 +36,12 @@ std::vector<fs::path> image_folders(const fs::path& path) {
   return {path / "images", path, path / "cameras", path / "krt"};
 }
 
-View read_camera(const fs::path& file, const fs::path& path) {
+View read_krt_camera(const fs::path& file, const fs::path& path) {
   const std::string where = file.string();
   check_name(file.filename().string(), where);
   const std::vector<double> n =
       parse_number_file(file, read_text_file(file, "KRT text: K (9), R (9), t (3)"), "number");
-  if (n.size() != kNumbers) {
+  if (n.size() != kKrtNumbers) {
     throw_invalid(where, std::to_string(n.size()) + " numbers", "21: K (9), R (9), t (3)");
   }
   View view;
@@ -78,7 +78,7 @@ std::vector<fs::path> find_krt(const fs::path& path) {
 
 Dataset read_krt(const fs::path& path) {
   Dataset dataset;
-  for (const fs::path& file : find_krt(path)) dataset.views.push_back(read_camera(file, path));
+  for (const fs::path& file : find_krt(path)) dataset.views.push_back(read_krt_camera(file, path));
   return dataset;
 }
 

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kNumbers = 9 + 3 + 9 + 3 + 2;
+constexpr std::size_t kStrechaNumbers = 9 + 3 + 9 + 3 + 2;
 
 int checked_size(double size, const std::string& where) {
   if (!(size >= 1 && size <= 1 << 20) || size != std::floor(size)) {
@@ -21,11 +21,11 @@ int checked_size(double size, const std::string& where) {
   return static_cast<int>(size);
 }
 
-View read_camera(const fs::path& file, const fs::path& folder) {
+View read_strecha_camera(const fs::path& file, const fs::path& folder) {
   const std::string where = file.string();
   const std::vector<double> n =
       parse_number_file(file, read_text_file(file, "Strecha's text: K, 0 0 0, R, C, width height"), "number");
-  if (n.size() != kNumbers) {
+  if (n.size() != kStrechaNumbers) {
     throw_invalid(where, std::to_string(n.size()) + " numbers",
                   "26: K (9), 0 0 0, R (9), C (3), width height");
   }
@@ -57,7 +57,7 @@ std::vector<fs::path> find_strecha(const fs::path& path) {
 
 Dataset read_strecha(const fs::path& path) {
   Dataset dataset;
-  for (const fs::path& file : find_strecha(path)) dataset.views.push_back(read_camera(file, path));
+  for (const fs::path& file : find_strecha(path)) dataset.views.push_back(read_strecha_camera(file, path));
   return dataset;
 }
 

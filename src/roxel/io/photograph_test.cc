@@ -103,8 +103,9 @@ TEST_F(LoadPhotograph, UndoesTheLensOfImageAndMaskAlike) {
       // The file has 8 bits: half a code is 0.2 of the 0.01 that one pixel is.
       ASSERT_NEAR(photograph.rgb.pixel(x, y)[0] * 100, p.x(), 0.21);
       ASSERT_NEAR(photograph.rgb.pixel(x, y)[1] * 100, p.y(), 0.21);
-      if (std::abs(p.x() - kMaskEdge) > 0.5)
+      if (std::abs(p.x() - kMaskEdge) > 0.5) {
         ASSERT_EQ(photograph.foreground.at(x, y), p.x() > kMaskEdge ? 255 : 0);
+      }
     }
 }
 

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr const char* kFormat = "roxel sky";
+constexpr const char* kSkyFormat = "roxel sky";
 constexpr int kVersion = 1;
 constexpr double kDegrees = 180 / std::numbers::pi;
 
@@ -66,7 +66,7 @@ ordered_json to_json(const NodeSky& sky) {
   const SkyLight light(sky);
   ordered_json rotation = ordered_json::array();
   for (int row = 0; row < 3; ++row) rotation.push_back(triple(sky.sky_from_world.row(row).transpose()));
-  return {{"format", kFormat},
+  return {{"format", kSkyFormat},
           {"version", kVersion},
           {"node", sky.name},
           {"model", to_string(sky.model)},
@@ -198,7 +198,7 @@ void read_rotation(const Fields& fields, NodeSky& sky) {
 
 NodeSky from_json(const json& root, const std::string& file) {
   const Fields fields(root, file);
-  if (fields.text("format") != kFormat)
+  if (fields.text("format") != kSkyFormat)
     throw_invalid(fields.where("format"), root["format"].dump(), "\"roxel sky\"");
   fields.whole("version", kVersion, kVersion);
   NodeSky sky;

@@ -5,7 +5,6 @@
 
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 #include <fstream>
@@ -13,6 +12,7 @@
 
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
+#include "roxel/volume/vdb_grids.inl"
 
 namespace roxel {
 namespace {
@@ -22,7 +22,7 @@ using openvdb::GridBase;
 using openvdb::Vec3f;
 using openvdb::Vec3SGrid;
 
-constexpr int kFormat = 1;
+constexpr int kVolumeFormat = 1;
 constexpr const char* kExpected = "a volume written by roxel (docs/format.md)";
 constexpr const char* kCreator = "roxel " ROXEL_VERSION;
 
@@ -50,7 +50,7 @@ void for_each_voxel(const Brick& brick, Visit visit) {
 template <class GridType, class Get>
 GridBase::Ptr grid_of(const BrickIndex& index, Get get) {
   using Leaf = typename GridType::TreeType::LeafNodeType;
-  const auto grid = GridType::create(openvdb::zeroVal<typename GridType::ValueType>());
+  const auto grid = make_grid<GridType>(openvdb::zeroVal<typename GridType::ValueType>());
   for (const Brick& brick : index.bricks()) {
     auto leaf = std::make_unique<Leaf>(first_voxel(brick), grid->background());
     for_each_voxel(brick, [&](openvdb::Index at, std::uint32_t slot) { leaf->setValueOn(at, get(slot)); });
@@ -102,7 +102,7 @@ openvdb::MetaMap file_metadata(const VolumeInfo& info, int lattice_count) {
   openvdb::MetaMap meta;
   const WhitePoint& white = info.colors.white();
   meta.insertMeta("roxel:version", openvdb::StringMetadata(ROXEL_VERSION));
-  meta.insertMeta("roxel:format", openvdb::Int32Metadata(kFormat));
+  meta.insertMeta("roxel:format", openvdb::Int32Metadata(kVolumeFormat));
   meta.insertMeta("roxel:lattices", openvdb::Int32Metadata(lattice_count));
   meta.insertMeta("roxel:color_space", openvdb::StringMetadata(to_string(info.colors.space())));
   meta.insertMeta("roxel:white_point", openvdb::Vec2DMetadata({white.x, white.y}));
@@ -168,8 +168,8 @@ class Archive {
 };
 
 VolumeInfo info_from(const Archive& archive) {
-  if (const int format = archive.value<std::int32_t>("roxel:format"); format != kFormat)
-    archive.refuse("format " + std::to_string(format), "format " + std::to_string(kFormat));
+  if (const int format = archive.value<std::int32_t>("roxel:format"); format != kVolumeFormat)
+    archive.refuse("format " + std::to_string(format), "format " + std::to_string(kVolumeFormat));
   const openvdb::Vec2d white = archive.value<openvdb::Vec2d>("roxel:white_point");
   if (!(white.x() > 0 && white.y() > 0 && white.x() + white.y() < 1))
     archive.refuse("an impossible white point");
@@ -276,6 +276,8 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
       file.open(temporary, std::ios::binary);
       openvdb::io::Stream(file).write(grids, file_metadata(info, count));
       file.close();
+    } catch (const std::ios_base::failure&) {
+      throw IoError(path.string() + ": writing failed (disc full, or no permission?)");
     } catch (const std::exception& e) {
       throw IoError(path.string() + ": cannot write the volume: " + e.what());
     }

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <cstdio>
 #include <cstring>
@@ -11,6 +10,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/full_disc_fixture.h"
+#include "roxel/volume/vdb_grids.inl"
 
 namespace roxel {
 namespace {
@@ -179,7 +179,7 @@ TEST_F(VolumeFileTest, RefusesAMissingFileAndAForeignOne) {
 }
 
 TEST_F(VolumeFileTest, NamesTheGridsOfAVolumeOfAnotherProgram) {
-  const auto density = openvdb::FloatGrid::create();
+  const auto density = make_grid<openvdb::FloatGrid>();
   density->setName("density");
   openvdb::io::File(path_.string()).write(openvdb::GridPtrVec{density});
   EXPECT_THAT(refusal(path_), testing::AllOf(HasSubstr(path_.string()), HasSubstr("grids density")));
@@ -206,7 +206,7 @@ TEST_F(VolumeFileTest, NamesTheGridThatIsMissingOrDoesNotFit) {
               testing::AllOf(HasSubstr("expected a grid \"support\""), HasSubstr("color_mean")));
   EXPECT_THAT(rewritten([](Ptr g) {
                 if (g->getName() != "confidence") return g;
-                Ptr wrong = openvdb::Vec3SGrid::create();
+                Ptr wrong = make_grid<openvdb::Vec3SGrid>();
                 wrong->setName("confidence");
                 return wrong;
               }),

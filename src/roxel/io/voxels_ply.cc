@@ -17,7 +17,7 @@ static_assert(std::endian::native == std::endian::little, "rows are written as t
 
 constexpr int kRowBytes = 3 * 4 + 3 + 4;
 
-std::uint8_t byte_of(float linear) {
+std::uint8_t srgb_byte(float linear) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(srgb_encode(linear), 0.0f, 1.0f)));
 }
 
@@ -26,7 +26,7 @@ void append_row(const Eigen::Vector3d& centre, const float color[3], const Color
   float rgb[3];
   colors.to_rgb(color, rgb);
   const Eigen::Vector3f x = centre.cast<float>();
-  const std::uint8_t bytes[3] = {byte_of(rgb[0]), byte_of(rgb[1]), byte_of(rgb[2])};
+  const std::uint8_t bytes[3] = {srgb_byte(rgb[0]), srgb_byte(rgb[1]), srgb_byte(rgb[2])};
   char row[kRowBytes];
   std::memcpy(row, x.data(), 12);
   std::memcpy(row + 12, bytes, 3);

@@ -14,7 +14,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int kPictureWidth = 320;
 constexpr int kPictureQuality = 78;
 
 constexpr const char* kStyle = R"(
@@ -491,8 +490,8 @@ std::vector<int> report_views(int count) {
   return shown;
 }
 
-ReportPicture report_picture(const std::string& caption, const Image& picture) {
-  return {caption, data_uri("image/jpeg", jpeg_bytes(thumbnail(picture, kPictureWidth), kPictureQuality))};
+ReportPicture report_picture(const std::string& caption, const Image& picture, int width) {
+  return {caption, data_uri("image/jpeg", jpeg_bytes(thumbnail(picture, width), kPictureQuality))};
 }
 
 }  // namespace roxel

@@ -47,7 +47,10 @@ inline constexpr int kMostReportViews = 12;
 /// Which of `count` views are shown, ascending.
 std::vector<int> report_views(int count);
 
+inline constexpr int kReportPictureWidth = 320;
 /// A photograph, render or other picture of a view at the size that reports have.
-ReportPicture report_picture(const std::string& caption, const Image& picture);
+/// `width`: at most, pixels.
+ReportPicture report_picture(const std::string& caption, const Image& picture,
+                             int width = kReportPictureWidth);
 
 }  // namespace roxel

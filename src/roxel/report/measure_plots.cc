@@ -107,7 +107,7 @@ NamedPlot quality_plot(const std::string& name, const std::string& title,
 }
 
 /// The number of that name, or NaN: a gap.
-double number(const ordered_json& pass, const char* key) {
+double number_or_gap(const ordered_json& pass, const char* key) {
   const auto found = pass.is_object() ? pass.find(key) : pass.end();
   return pass.is_object() && found != pass.end() && found->is_number() ? found->get<double>() : NAN;
 }
@@ -119,13 +119,13 @@ NamedPlot pass_plot(const ordered_json& passes, const char* name, const char* ti
   int count = 0;
   double level = 0;
   for (const auto& pass : passes) {
-    const double of_pass = number(pass, "level");
+    const double of_pass = number_or_gap(pass, "level");
     if (levels.empty() || (of_pass != level && !std::isnan(of_pass))) {
       level = std::isnan(of_pass) ? 0 : of_pass;
       levels.push_back({"level " + short_number(level), {}, {}});
     }
     levels.back().x.push_back(++count);
-    levels.back().y.push_back(number(pass, key));
+    levels.back().y.push_back(number_or_gap(pass, key));
   }
   return {name, {title, {"pass", 0.5, count + 0.5}, std::move(y), std::move(levels)}};
 }

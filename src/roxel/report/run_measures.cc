@@ -106,6 +106,7 @@ ordered_json volume_json(const RunMeasures& measures) {
   for (int bin = 0; bin <= DistanceHistogram::kBins; ++bin)
     mean_opacity.push_back(a.histogram.mean_opacity(bin));
   return {{"opacity_threshold", measures.opacity_threshold},
+          {"confidence_threshold", measures.confidence_threshold},
           {"voxels", a.voxels},
           {"share_within_4_voxels", a.share_close()},
           {"weighted_mean_opacity", a.weighted_mean_opacity()},
@@ -297,7 +298,7 @@ std::string color_text(const std::optional<ColorAccuracy>& color) {
 
 bool RunMeasures::empty() const {
   return depth.empty() && reprojection.empty() && surfaces.empty() && !volume && images.empty() &&
-         held_out.empty() && !color && skies.empty();
+         held_out.empty() && !color && light.empty() && skies.empty();
 }
 
 DepthAccuracy total_depth(const std::vector<NamedDepthAccuracy>& views) {
@@ -341,6 +342,7 @@ ordered_json to_json(const RunMeasures& measures) {
   json["reprojection"] = ordered_json::array();
   for (const auto& [name, rms] : measures.reprojection)
     json["reprojection"].push_back({{"name", name}, {"rms_percent", rms}});
+  if (!measures.light.empty()) json["light"] = to_json(measures.light);
   if (!measures.skies.empty()) json["skies"] = to_json(measures.skies);
   json["notes"] = measures.notes;
   return json;
@@ -358,6 +360,7 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& m
   if (measures.volume) tables.emplace_back("voxel_distances.csv", histogram_csv(measures.volume->histogram));
   if (!measures.images.empty()) tables.emplace_back("images.csv", quality_csv(measures.images));
   if (!measures.held_out.empty()) tables.emplace_back("held_out.csv", quality_csv(measures.held_out));
+  if (!measures.light.empty()) tables.emplace_back("light.csv", csv_table(measures.light));
   if (!measures.skies.empty()) tables.emplace_back("skies.csv", csv_table(measures.skies));
   return tables;
 }
@@ -368,7 +371,7 @@ std::string to_text(const RunMeasures& measures, std::size_t most_views) {
   if (!measures.depth_methods.empty()) text += depth_methods_table(measures.depth_methods) + "\n";
   text += surfaces_text(measures) + volume_text(measures) + quality_text("images", measures.images) +
           quality_text("held-out images", measures.held_out) + calibration_text(measures) +
-          color_text(measures.color) + to_text(measures.skies);
+          color_text(measures.color) + to_text(measures.light) + to_text(measures.skies);
   if (measures.reprojection_rms_percent)
     text += formatted("reprojection error %.2f %% of full scale\n", *measures.reprojection_rms_percent);
   for (const std::string& note : measures.notes) text += "note: " + note + "\n";

@@ -15,6 +15,7 @@
 #include "roxel/eval/section.h"
 #include "roxel/eval/surface_accuracy.h"
 #include "roxel/eval/volume_accuracy.h"
+#include "roxel/report/light_measures.h"
 #include "roxel/report/sky_measures.h"
 
 namespace roxel {
@@ -48,11 +49,13 @@ struct RunMeasures {
   double surface_seen = 0;           ///< share of them that two views see
   std::vector<NamedSurfaceAccuracy> surfaces;
   std::optional<VolumeAccuracy> volume;
-  double opacity_threshold = 0;  ///< of the voxels that count in `volume`
+  double opacity_threshold = 0;     ///< of the voxels that count in `volume`
+  double confidence_threshold = 0;  ///< of the same voxels
   std::vector<NamedImageQuality> images;
   std::vector<NamedImageQuality> held_out;  ///< views that the run has not seen
   std::optional<ColorAccuracy> color;
-  std::vector<Section> sections;  ///< with the true outline
+  std::vector<Section> sections;    ///< with the true outline
+  std::vector<LightMeasure> light;  ///< of the photographs, divided by one kind of light after the other
   std::vector<SkyMeasure> skies;
   std::vector<std::string> notes;
 

@@ -45,14 +45,14 @@ ordered_json background_json(const Scene& scene) {
   return background;
 }
 
-const char* light_name(LightSource from) {
-  switch (from) {
+const char* light_name(const Light& light) {
+  switch (light.from) {
     case LightSource::kNone:
       return "none";
     case LightSource::kGain:
       return "gain";
     case LightSource::kSky:
-      return "sky";
+      return light.by_normal ? "sky-normal" : "sky";
   }
   return "";
 }
@@ -72,7 +72,7 @@ ordered_json scene_json(const RunRecord& record) {
           {"white_point", to_string(scene.transform.white())},
           {"exposure", scene.exposure},
           {"light",
-           {{"illumination", light_name(scene.light.from)},
+           {{"illumination", light_name(scene.light)},
             {"matching", scene.light.local_matching ? "local" : "canonical"},
             {"matching_blur_deg", scene.light.blur_deg}}},
           {"background", background_json(scene)}};
@@ -99,7 +99,8 @@ ordered_json light_json(const LightRecord& light) {
   return {{"level", light.level},
           {"pass", light.pass},
           {"fitted_views", light.fitted_views},
-          {"largest_change", light.largest_change}};
+          {"largest_change", light.largest_change},
+          {"spread", light.spread}};
 }
 
 ordered_json level_json(const LevelRecord& level) {
@@ -167,6 +168,7 @@ ordered_json to_json(const RunRecord& record) {
                     {"warnings", record.warnings},
                     {"views", views_json(record)}};
   if (!record.skies.empty()) json["skies"] = record.skies;
+  if (!record.skies_again.empty()) json["skies_again"] = record.skies_again;
   return json;
 }
 
@@ -220,8 +222,9 @@ Light light_of_run(const FinishedRun& run, const Dataset& dataset) {
     const json scene = run.summary.value("scene", json::object());
     const json found = scene.value("light", json::object());
     const std::string from = found.value("illumination", "none");
-    for (const LightSource source : {LightSource::kGain, LightSource::kSky})
-      if (from == light_name(source)) light.from = source;
+    light.by_normal = from == "sky-normal";
+    if (from == "gain") light.from = LightSource::kGain;
+    if (from == "sky" || light.by_normal) light.from = LightSource::kSky;
     light.local_matching = found.value("matching", "canonical") == "local";
     light.blur_deg = found.value("matching_blur_deg", light.blur_deg);
     if (light.from == LightSource::kNone) return light;
@@ -260,7 +263,7 @@ void remove_results(const fs::path& run) {
     for (const json& view : summary.value("views", json::array())) {
       const std::string name = view.value("name", "");
       if (name.empty()) continue;
-      for (const char* kind : {"depth", "render", "error"})
+      for (const char* kind : {"depth", "render", "error", "light"})
         for (const char* suffix : {".png", ".exr"}) fs::remove(view_path(run, kind, name, suffix), ignored);
     }
   } catch (const json::exception&) {  // a damaged list of views: what it named stays

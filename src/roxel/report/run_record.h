@@ -40,7 +40,8 @@ struct RunRecord {
   LatticeFrame frame;  ///< of the box
   Summary summary;
   std::vector<std::string> warnings;
-  std::vector<nlohmann::ordered_json> skies;  ///< as roxel sky reports them, where they were fitted
+  std::vector<nlohmann::ordered_json> skies_again;  ///< what unexplained rays did to each sky
+  std::vector<nlohmann::ordered_json> skies;        ///< as roxel sky reports them, where they were fitted
   std::vector<ViewFigures> views;
   std::optional<double> reprojection_rms;  ///< percent, over all views together
   nlohmann::ordered_json mesh;             ///< what was made of the surface; null: none

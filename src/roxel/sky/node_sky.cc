@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/base/error.h"
 #include "roxel/sky/facet_sphere.h"
 #include "roxel/sky/sky_picture.h"
@@ -9,7 +10,6 @@
 namespace roxel {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr int kQuadratureLevel = 5;  ///< 4096 directions of the dome
 
 /// Associated Legendre function P_l^m(x) without the sign (-1)^m, by the usual recurrences.

@@ -1,4 +1,5 @@
 #include "roxel/sky/node_sky.h"
+#include "roxel/base/angles.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,6 @@
 namespace roxel {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kQuadrature = 2e-3;  ///< 4096 directions
 
 NodeSky uniform_sky() {

@@ -2,8 +2,8 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/base/formatted.h"
 #include "roxel/sky/perez_fit.h"
 #include "roxel/sky/sun_search.h"
@@ -11,7 +11,6 @@
 namespace roxel {
 namespace {
 
-constexpr double kPi = std::numbers::pi, kDegree = kPi / 180;
 constexpr double kHemisphere = 2 * kPi;
 constexpr double kNightDeg = -6;         ///< civil twilight ends
 constexpr double kLeastShare = 0.0005;   ///< of the hemisphere, for any model
@@ -24,6 +23,9 @@ constexpr double kPriorStrength = 2e-5;  ///< as much as a relative error of 0.7
 /// Regions apart from the sky's (gaps, arches) must be about as bright and of that colour: windows are
 /// darker.
 constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
+/// Clouds against walls, where a volume knows of neither: smooth, grey or blue, not much darker than the
+/// model.
+constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
 constexpr double kSurelySun = 30;  ///< contrast of a spot worth a warning: lamps and white walls have less
@@ -62,6 +64,7 @@ class Fitting {
     out_.masks = sky_masks(out_.light, known_sun(), options_.masks);
     out_.used = out_.masks.sky;
     fit();
+    find_beyond_model();
     measure_fit();
     weigh_sun();
     return std::move(out_);
@@ -279,6 +282,30 @@ class Fitting {
     for (std::size_t i = 0; i < queue.size(); ++i)
       for (const int next : sphere_->neighbours(queue[i])) take(next);
     return agreeing;
+  }
+
+  /// Clouds over a clear sky, and the blue between clouds.
+  bool may_be_cloud(int f) const {
+    const FacetLight& facet = out_.light.facets[f];
+    const SkyMasks& m = out_.masks;
+    if (m.unusable[f] || m.near_sun[f] || out_.used[f] || !is_open(facet)) return false;
+    const double bright = luminance(facet.mean) / luminance(out_.sky.radiance_in_sky(sphere_->centre(f)));
+    return facet.contrast < kCloudContrast && facet.mean[0] < kCloudRedBlue * facet.mean[2] &&
+           bright > kCloudDarkest;
+  }
+
+  void find_beyond_model() {
+    out_.beyond_model.assign(out_.used.size(), 0);
+    if (!sky().has_light()) return;
+    std::vector<int> queue;
+    const auto spread = [&](int from) {
+      for (const int next : sphere_->neighbours(from))
+        if (!out_.beyond_model[next] && may_be_cloud(next))
+          out_.beyond_model[next] = 1, queue.push_back(next);
+    };
+    for (int f = 0; f < sphere_->count(); ++f)
+      if (out_.used[f]) spread(f);
+    for (std::size_t i = 0; i < queue.size(); ++i) spread(queue[i]);
   }
 
   void measure_fit() {

@@ -40,6 +40,9 @@ struct SkyFit {
   SphereLight light;
   SkyMasks masks;
   std::vector<std::uint8_t> used;  ///< facets of the last fit
+  /// Facets that are sky though the model does not agree with them, clouds: neutral, bright, next to the
+  /// others, and a volume knows of nothing there. 1 = such a one.
+  std::vector<std::uint8_t> beyond_model;
   int rounds = 0;
   bool settled = false;  ///< the last round changed no facet
   std::vector<std::string> warnings;

@@ -2,13 +2,11 @@
 /// For tests: a square under a known sky, as a panorama.
 
 #include <cmath>
-#include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/sky/sky_fit.h"
 
 namespace roxel {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 inline NodeSky clear_sky(double sun_azimuth = 150, double sun_elevation = 40) {
   NodeSky sky;

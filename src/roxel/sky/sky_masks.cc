@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/base/formatted.h"
 
 namespace roxel {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kNearSunDeg = 3, kGlareDeg = 10;
 constexpr double kBorneOut = 0.8;   ///< share of the surest region that must pass a mask for it to be used
 constexpr double kSureShare = 0.1;  ///< of the surest region's area: others need not be doubted
@@ -20,6 +19,7 @@ struct Region {
   std::vector<int> facets;
   double area = 0, height = 0;  ///< height: area x sine of elevation
   double blue = 0, bright = 0;  ///< area that passes the masks
+  double open = 0;              ///< area where a volume knows of nothing
 };
 
 class Masking {
@@ -112,6 +112,7 @@ class Masking {
       region.height += area * sphere_.centre(f).z();
       if (!out_.red_blue[f]) region.blue += area;
       if (!out_.luminance[f]) region.bright += area;
+      if (is_open(light_.facets[f])) region.open += area;
     }
   }
 
@@ -142,6 +143,10 @@ class Masking {
     for (const Region& region : regions_) {
       const bool blue = !out_.red_blue_used || region.blue >= kBorneOut * region.area;
       const bool bright = !out_.luminance_used || region.bright >= kBorneOut * region.area;
+      if (region.open >= kBorneOut * region.area) {  // nothing else is there
+        for (const int f : region.facets) out_.sky[f] = 1;
+        continue;
+      }
       // A region that is much smaller is a wall or a window until the fit says otherwise.
       if (!blue || !bright) continue;
       if (region.area > kSureShare * surest->area)

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "roxel/base/angles.h"
 
 namespace roxel {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 /// Of the rectangle from the axis to (x, y) at distance 1; odd in both.
 double corner_solid_angle(double x, double y) { return std::atan(x * y / std::sqrt(1 + x * x + y * y)); }

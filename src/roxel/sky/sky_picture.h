@@ -52,6 +52,7 @@ struct SkyPicture {
   Mask valid = {};      ///< 0 where there is no data; empty = all valid
   Mask known_sky = {};  ///< 255 where a person, or a volume, says that this is sky; empty = not known
   PixelRays rays;
+  Mask open = {};  ///< 255 where a volume lets the ray through: it knows of nothing there; empty = not known
   double clip = std::numeric_limits<double>::infinity();  ///< a channel of at least this is clipped
 };
 

@@ -41,6 +41,7 @@ class PixelMasking {
     std::vector<int> ring;
     std::vector<std::uint8_t> known = fit_.used;
     for (int f = 0; f < sphere.count(); ++f) {
+      known[f] |= fit_.beyond_model[f];
       if (!known[f]) continue;
       ring.push_back(f);
       const Eigen::Vector3d model = fit_.sky.radiance_in_sky(sphere.centre(f));
@@ -78,7 +79,8 @@ class PixelMasking {
         (fit_.sky.radiance_in_sky(direction).array() * correction_[last_facet_].array().exp()).matrix();
     double exponent = 0, density = 1;
     for (int c = 0; c < 3; ++c) {
-      const double sigma = std::hypot(fit_.sky.relative_sigma[c], kPixelSigma);
+      const double unrest = fit_.beyond_model[last_facet_] ? fit_.light.facets[last_facet_].contrast : 0;
+      const double sigma = std::hypot(fit_.sky.relative_sigma[c], kPixelSigma, unrest);
       const double error = log_error(picture_.rgb.pixel(x, y)[c], model[c]) / sigma;
       exponent += 0.5 * error * error;
       density /= std::sqrt(2 * M_PI) * sigma;
@@ -109,7 +111,7 @@ class PixelMasking {
       if (likeness_[i] > 0.5f) queue.push_back(i);
     };
     for (std::size_t i = 0; i < likeness_.size(); ++i)
-      if (likeness_[i] > 0.5f && fit_.used[facet_[i]]) reach(i);
+      if (likeness_[i] > 0.5f && (fit_.used[facet_[i]] || fit_.beyond_model[facet_[i]])) reach(i);
     for (std::size_t n = 0; n < queue.size(); ++n) {
       const int x = static_cast<int>(queue[n] % width_), y = static_cast<int>(queue[n] / width_);
       for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}})

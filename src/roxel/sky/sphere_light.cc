@@ -23,6 +23,7 @@ void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y, int samp
   const Eigen::Vector3d rgb = Eigen::Vector3f(picture.rgb.pixel(x, y)).cast<double>();
   const double light = luminance(rgb), weight = picture.rays.solid_angle(x, y) / (samples * samples);
   const bool clipped = rgb.maxCoeff() >= picture.clip;
+  const double open = picture.open.empty() ? 0 : picture.open.at(x, y) / 255.0;
   const double known = picture.known_sky.empty() ? 0 : picture.known_sky.at(x, y) / 255.0;
   for (int j = 0; j < samples; ++j)
     for (int i = 0; i < samples; ++i) {
@@ -33,6 +34,7 @@ void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y, int samp
       sum.peak = std::max(sum.peak, light);
       sum.bright += light * weight * d;
       sum.known_sky += known * weight;
+      sum.open += open * weight;
       if (clipped) {
         sum.clipped += weight;
         continue;
@@ -52,6 +54,7 @@ void SphereLightSum::fold() {
     total.weight += sum.weight;
     total.clipped += sum.clipped;
     total.known_sky += sum.known_sky;
+    total.open += sum.open;
     total.pixels += sum.pixels;
     total.first += sum.first;
     total.second += sum.second;
@@ -80,6 +83,7 @@ SphereLight SphereLightSum::result() const {
     facet.weight = total.weight;
     facet.clipped = total.clipped;
     facet.known_sky = total.known_sky;
+    facet.open = total.open;
     facet.coverage = total.coverage;
     facet.pixels = total.pixels;
     facet.pictures = total.pictures;

@@ -15,6 +15,7 @@ struct FacetLight {
   double weight = 0;     ///< steradians of usable pixels, of all pictures together
   double clipped = 0;    ///< steradians of clipped pixels
   double known_sky = 0;  ///< steradians that a mask by hand calls sky
+  double open = 0;       ///< steradians of rays that a volume lets through
   double coverage = 0;   ///< share of the facet that the picture which sees most of it sees (clipped too)
   std::int64_t pixels = 0;
   int pictures = 0;
@@ -26,6 +27,9 @@ struct FacetLight {
   Eigen::Vector3d bright =
       Eigen::Vector3d::Zero();  ///< sum of luminance x steradians x direction, clipped too
 };
+
+/// Whether a volume knows of nothing where the facet is.
+inline bool is_open(const FacetLight& facet) { return facet.open > 0.8 * (facet.weight + facet.clipped); }
 
 struct SphereLight {
   std::shared_ptr<const FacetSphere> sphere;
@@ -42,7 +46,7 @@ class SphereLightSum {
 
  private:
   struct Sum {
-    double weight = 0, clipped = 0, known_sky = 0;
+    double weight = 0, clipped = 0, known_sky = 0, open = 0;
     std::int64_t pixels = 0;
     Eigen::Vector3d first = Eigen::Vector3d::Zero(), second = Eigen::Vector3d::Zero();
     double luminance_second = 0, peak = 0;

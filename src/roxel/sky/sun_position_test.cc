@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include <cmath>
+
 #include <ctime>
+#include "roxel/base/parallel.h"
 
 namespace roxel {
 namespace {
@@ -46,6 +50,26 @@ TEST(SunPosition, ComesEarlierInTheEast) {
   const SunPosition here = sun_position(noon, 40, 0), east = sun_position(noon - 3600, 40, 15);
   EXPECT_NEAR(here.azimuth_deg, east.azimuth_deg, 0.05);
   EXPECT_NEAR(here.elevation_deg, east.elevation_deg, 0.05);
+}
+
+// Also not on what other threads ask meanwhile: skies of several nodes are fitted side by side.
+TEST(SunPosition, DependsOnNothingThatWasAskedBefore) {
+  constexpr double kTime = 1.06e9;
+  sun_position(kTime + 3e7, 40, 10);
+  const SunPosition alone = sun_position(kTime, 48, 2);
+  for (const double before : {60.0, 3600.0, 7200.0, -7200.0, 86400.0}) {
+    sun_position(kTime + 3e7, 40, 10);
+    sun_position(kTime + before, 40, 10);
+    const SunPosition after = sun_position(kTime, 48, 2);
+    EXPECT_EQ(after.azimuth_deg, alone.azimuth_deg) << before;
+    EXPECT_EQ(after.elevation_deg, alone.elevation_deg) << before;
+  }
+  std::atomic<int> others{0};
+  parallel_for(4000, 4, [&](std::int64_t i, int) {
+    const SunPosition now = sun_position(kTime + 1000 * (i % 2), 48, 2);
+    others += i % 2 == 0 && now.azimuth_deg != alone.azimuth_deg;
+  });
+  EXPECT_EQ(others, 0);
 }
 
 TEST(SunDirection, IsEastNorthUp) {

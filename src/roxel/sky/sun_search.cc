@@ -4,10 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "roxel/base/angles.h"
+
 namespace roxel {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kLeastContrast = 12;
 constexpr double kWidestPatchDeg = 7.5;  ///< radius
 constexpr double kClusterDeg = 3;

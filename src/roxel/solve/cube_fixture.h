@@ -117,4 +117,21 @@ inline PhotographLoader cube_loader(
   };
 }
 
+/// What the views' exposures and white balances are: up to a factor of about two apart.
+inline std::array<float, 3> true_light(int view) {
+  const float exposure = std::exp2(std::sin(2.4f * static_cast<float>(view)) / 2);
+  const float tint = 1 + 0.2f * std::sin(1.7f * static_cast<float>(view) + 1);
+  return {exposure * tint, exposure, exposure / tint};
+}
+
+/// Photographs of the cube with masks, each in its own light.
+inline PhotographLoader lit_loader(const Dataset& dataset) {
+  return [&dataset](const View& view) {
+    Photograph photo = CubeWorld::photograph(view.camera, std::array<float, 3>{0, 0, 0}, true);
+    const std::array<float, 3> light = true_light(static_cast<int>(&view - dataset.views.data()));
+    for (std::size_t i = 0; i < photo.rgb.data().size(); ++i) photo.rgb.data()[i] *= 0.4f * light[i % 3];
+    return photo;
+  };
+}
+
 }  // namespace roxel::fixture

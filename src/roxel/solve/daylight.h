@@ -10,6 +10,12 @@
 
 namespace roxel {
 
+/// What a dome's light is worth, in one number a channel.
+enum class DomeLight {
+  kHorizontal,  ///< what a white surface that looks up looks like: irradiance over pi
+  kMean,        ///< plain mean of radiance [Jethwa04] §7.2.3
+};
+
 struct Daylight {
   std::vector<NodeSky> skies;
   std::vector<int> sky_of_views;  ///< one a view; -1 where none is known
@@ -19,9 +25,13 @@ struct Daylight {
   const NodeSky* of_view(int view_idx) const;
 };
 
-/// What a white horizontal surface looks like under each view's whole dome, the sun's disc included, over the
-/// geometric mean luminance of that of all views: canonical colours are as under white light of mean
-/// strength. Views without a known light get 1. Empty where no view has one.
-std::vector<std::array<float, 3>> light_of_views(const Daylight& daylight);
+/// The geometric mean over the views of the luminance of their domes' light, the sun's disc included; 0 where
+/// no view has one.
+double mean_light(const Daylight& daylight, DomeLight worth = DomeLight::kHorizontal);
+
+/// Each view's dome's light, the sun's disc included, over mean_light: canonical colours are as under white
+/// light of mean strength. Views without a known light get 1. Empty where no view has one.
+std::vector<std::array<float, 3>> light_of_views(const Daylight& daylight,
+                                                 DomeLight worth = DomeLight::kHorizontal);
 
 }  // namespace roxel

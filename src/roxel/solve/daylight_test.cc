@@ -44,6 +44,16 @@ TEST(LightOfViews, TheSunsDiscCounts) {
   EXPECT_NEAR(with[1][0] / with[0][0], 10 * without[1][0] / without[0][0], 0.05);
 }
 
+TEST(LightOfViews, TheMeanOfTheDomeIsAnotherWorth) {
+  Daylight daylight = two_skies();
+  daylight.skies[1].sun_light = SunLight::kMeasured;
+  daylight.skies[1].sun_irradiance = Eigen::Vector3d::Constant(2 * M_PI);
+  // Radiance 1 and a sun at the zenith: 1 + 2 on the horizontal, 1 + 1 in the mean over the dome.
+  const auto horizontal = light_of_views(daylight), mean = light_of_views(daylight, DomeLight::kMean);
+  EXPECT_NEAR(horizontal[1][0] / horizontal[0][0], 3.0 / 2, 0.02);
+  EXPECT_NEAR(mean[1][0] / mean[0][0], 2.0 / 2, 0.02);
+}
+
 TEST(LightOfViews, NothingIsKnownWithoutASky) {
   EXPECT_TRUE(light_of_views({{NodeSky{}}, {0, 0}, false}).empty());
   EXPECT_TRUE(light_of_views({{}, {-1, -1}, false}).empty());
@@ -77,6 +87,9 @@ TEST_F(ChooseLight, OptionsAreObeyed) {
   EXPECT_FALSE(scene_with(IlluminationChoice::kSky, Matching::kCanonical, &skies_).light.local_matching);
   EXPECT_TRUE(scene_with(IlluminationChoice::kNone, Matching::kLocal, nullptr).light.local_matching);
   EXPECT_THROW(scene_with(IlluminationChoice::kSky, Matching::kAuto, nullptr), InvalidInput);
+  EXPECT_THROW(scene_with(IlluminationChoice::kSkyNormal, Matching::kAuto, nullptr), InvalidInput);
+  const Light by_normal = scene_with(IlluminationChoice::kSkyNormal, Matching::kAuto, &skies_).light;
+  EXPECT_TRUE(by_normal.by_normal && by_normal.local_matching && by_normal.from == LightSource::kSky);
 }
 
 TEST_F(ChooseLight, MasksOfTheSkyLeaveTheRestOfTheHorizonToTheSurround) {

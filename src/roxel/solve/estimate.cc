@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "roxel/base/error.h"
+#include "roxel/base/formatted.h"
 #include "roxel/image/sample_pyramid.h"
 #include "roxel/infer/run_pass.h"
 #include "roxel/march/sample_plan.h"
@@ -37,6 +39,7 @@ constexpr double kScratchBytes = 64;
 constexpr double kKeptShare = 0.6;  ///< of the voxels, for each node
 constexpr double kVoxelsPerBrick = 150;
 constexpr double kWritingBytesPerBrick = 36 * 1024;
+constexpr double kGiB = 1024.0 * 1024 * 1024;
 constexpr double kProgramBytes = 200e6;  ///< libraries
 constexpr double kMemoryMargin = 1.15;   ///< rather too much than too little
 constexpr double kDecodedBytesPerPixel = 40;
@@ -46,22 +49,17 @@ double pixel_count(const View& view) {
   return static_cast<double>(view.camera.intrinsics.width) * view.camera.intrinsics.height;
 }
 
-/// Bytes of a SamplePyramid.
-double pyramid_bytes(double pixels, int finest_level) {
-  constexpr double kRegion = sizeof(RegionStats);
-  if (finest_level == 0) return pixels * (14 + kRegion / 3);
-  return pixels * std::ldexp(1.0, -2 * finest_level) * kRegion * 4 / 3;
-}
-
 /// What the images of a level amount to.
 struct SampleLoad {
   double rays = 0;
-  double bytes = 0;
+  double bytes = 0;         ///< of all samples
+  double largest_node = 0;  ///< bytes of those of the node that has most
 };
 
 SampleLoad sample_load(const Dataset& dataset, const Scene& scene, double voxel_size,
                        const ReconstructOptions& options) {
   SampleLoad load;
+  std::vector<double> of_nodes(dataset.nodes.size(), 0.0);
   SamplePlanOptions plan_options;
   plan_options.samples_per_voxel = options.samples_per_voxel;
   plan_options.adaptive = options.adaptive;
@@ -70,8 +68,11 @@ SampleLoad sample_load(const Dataset& dataset, const Scene& scene, double voxel_
     const SamplePlan plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size,
                                              view_range(scene, dataset, static_cast<int>(v)), plan_options);
     load.rays += kRaysPerSample * pixel_count(view) * std::ldexp(1.0, -2 * plan.finest_level);
-    load.bytes += pyramid_bytes(pixel_count(view), plan.finest_level);
+    const double bytes = pyramid_bytes(pixel_count(view), plan.finest_level);
+    load.bytes += bytes;
+    of_nodes[view.node_idx] += bytes;
   }
+  for (const double bytes : of_nodes) load.largest_node = std::max(load.largest_node, bytes);
   return load;
 }
 
@@ -105,45 +106,115 @@ LevelEstimate estimate_level(const Scene& scene, double voxel_size, bool first_l
   return level;
 }
 
-/// Resident memory while a level's passes run, or while the volume is written.
-double level_bytes(const LevelEstimate& level, const SampleLoad& load, double largest_image, int nodes,
-                   int threads) {
+/// What a level needs beside what may be shared out, and what it would take of that.
+struct LevelNeeds {
+  double needed = 0;     ///< without any samples that stay, or kept colours
+  double samples = 0;    ///< to keep all
+  double in_flight = 0;  ///< more, where not all samples stay: one node a worker
+  double colors = 0;     ///< to keep those of all nodes
+};
+
+LevelNeeds level_needs(const LevelEstimate& level, const SampleLoad& load, double largest_image, int nodes,
+                       int threads) {
   const double bricks = level.voxels / kVoxelsPerBrick;
   const double volume = level.voxels * kChannelBytes + bricks * sizeof(Brick);
-  const double passing = level.voxels * (kTotalsBytes + kScratchBytes * threads) + load.bytes +
-                         threads * largest_image * kResultBytesPerPixel;  // depth is last, beside the same
-  // What nodes say of the voxels they see is kept up to a limit (KeptColors).
-  const double kept = std::min(static_cast<double>(PassOptions().kept_color_bytes),
-                               kKeptShare * nodes * level.voxels * sizeof(OwnColors::Entry));
-  const double loading = load.bytes + threads * largest_image * kDecodedBytesPerPixel;
-  const double largest = std::max({passing + kept, loading, bricks * kWritingBytesPerBrick});
-  return kMemoryMargin * (kProgramBytes + volume + largest);
+  // Checkpoints are written, and last of all depth is made, beside what passes work in.
+  const double passing =
+      level.voxels * (kTotalsBytes + kScratchBytes * threads) +
+      std::max(threads * largest_image * kResultBytesPerPixel, bricks * kWritingBytesPerBrick);
+  const double loading = threads * largest_image * kDecodedBytesPerPixel;
+  LevelNeeds needs;
+  needs.needed = kProgramBytes + volume + std::max(passing, loading);
+  needs.samples = load.bytes;
+  needs.in_flight = threads * (load.largest_node + largest_image * kDecodedBytesPerPixel);
+  needs.colors = kKeptShare * nodes * level.voxels * sizeof(OwnColors::Entry);
+  return needs;
+}
+
+double largest_image_of(const Dataset& dataset) {
+  double largest = 0;
+  for (const View& view : dataset.views) largest = std::max(largest, pixel_count(view));
+  return largest;
+}
+
+double layers_of(const Scene& scene) { return kSheetLayers * (scene.seen_from_inside ? kInsideFactor : 1); }
+
+double level_voxel_size(const Scene& scene, const ReconstructOptions& options, int level) {
+  return std::ldexp(scene.voxel_size, options.levels - 1 - level);
+}
+
+std::vector<LevelNeeds> needs_of_levels(const Dataset& dataset, const Scene& scene,
+                                        const ReconstructOptions& options, int threads) {
+  std::vector<LevelNeeds> needs;
+  for (int level = 0; level < options.levels; ++level) {
+    const double voxel_size = level_voxel_size(scene, options, level);
+    const SampleLoad load = sample_load(dataset, scene, voxel_size, options);
+    needs.push_back(level_needs(estimate_level(scene, voxel_size, level == 0, load.rays, layers_of(scene)),
+                                load, largest_image_of(dataset), static_cast<int>(dataset.nodes.size()),
+                                threads));
+  }
+  return needs;
+}
+
+/// The finest voxel size that keeps to the limit, where `scene`'s does not; 0 where none does.
+double voxel_size_that_fits(const Dataset& dataset, Scene scene, const ReconstructOptions& options,
+                            int threads) {
+  constexpr double kStep = 1.05, kCoarsest = 100;
+  for (const double finest = scene.voxel_size; scene.voxel_size < kCoarsest * finest;
+       scene.voxel_size *= kStep)
+    if (plan_memory(dataset, scene, options, threads).fits) return scene.voxel_size;
+  return 0;
 }
 
 }  // namespace
 
+double pyramid_bytes(double pixels, int finest_level) {
+  constexpr double kRegion = sizeof(RegionStats);
+  if (finest_level == 0) return pixels * (14 + kRegion / 3);
+  return pixels * std::ldexp(1.0, -2 * finest_level) * kRegion * 4 / 3;
+}
+
+MemoryPlan plan_memory(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
+                       int threads) {
+  const std::vector<LevelNeeds> levels = needs_of_levels(dataset, scene, options, threads);
+  MemoryPlan plan;
+  plan.limit_bytes = options.memory ? *options.memory * kGiB : memory_at_hand();
+  for (const LevelNeeds& level : levels) {
+    const double room = plan.limit_bytes / kMemoryMargin - level.needed;
+    if (level.samples <= room) continue;
+    plan.sample_bytes = std::clamp(room - level.in_flight, 0.0, plan.sample_bytes);
+  }
+  const auto taken_by_samples = [&](const LevelNeeds& level) {
+    return level.samples <= plan.sample_bytes ? level.samples : plan.sample_bytes + level.in_flight;
+  };
+  double colors = static_cast<double>(plan.kept_color_bytes);
+  for (const LevelNeeds& level : levels)
+    colors = std::min(
+        colors, std::max(0.0, plan.limit_bytes / kMemoryMargin - level.needed - taken_by_samples(level)));
+  plan.kept_color_bytes = static_cast<std::int64_t>(colors);
+  for (const LevelNeeds& level : levels)
+    plan.peak_bytes = std::max(plan.peak_bytes, kMemoryMargin * (level.needed + taken_by_samples(level) +
+                                                                 std::min(colors, level.colors)));
+  plan.fits = plan.peak_bytes <= plan.limit_bytes * (1 + 1e-9);
+  return plan;
+}
+
 CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
                            int threads) {
-  double all_pixels = 0, largest_image = 0;
-  for (const View& view : dataset.views) {
-    all_pixels += pixel_count(view);
-    largest_image = std::max(largest_image, pixel_count(view));
-  }
-  const double layers = kSheetLayers * (scene.seen_from_inside ? kInsideFactor : 1);
+  double all_pixels = 0;
+  for (const View& view : dataset.views) all_pixels += pixel_count(view);
   CostEstimate cost;
+  cost.memory = plan_memory(dataset, scene, options, threads);
   double core_ns = all_pixels * kLoadPixelNs;  // survey
   for (int level = 0; level < options.levels; ++level) {
-    const double voxel_size = std::ldexp(scene.voxel_size, options.levels - 1 - level);
+    const double voxel_size = level_voxel_size(scene, options, level);
     const SampleLoad load = sample_load(dataset, scene, voxel_size, options);
-    const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays, layers);
+    const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays, layers_of(scene));
     const double colour_marches = options.predictive ? 1.5 : 1;  // most nodes' own colours are kept
     core_ns += all_pixels * kLoadPixelNs;
     const int drafts = std::min(options.draft_passes, options.passes - 1);
     const double full_passes = options.passes - drafts * (1 - kDraftCost);
     core_ns += full_passes * estimate.steps_per_pass * (colour_marches * kColorStepNs + kOpacityStepNs);
-    cost.memory_bytes =
-        std::max(cost.memory_bytes,
-                 level_bytes(estimate, load, largest_image, static_cast<int>(dataset.nodes.size()), threads));
     cost.levels.push_back(estimate);
   }
   // Depth and renders look along the ray of every pixel.
@@ -153,6 +224,22 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
                                (kColorStepNs + kOpacityStepNs));
   cost.seconds = 1e-9 * core_ns / threads;
   return cost;
+}
+
+std::string memory_shortage(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
+                            int threads) {
+  const MemoryPlan plan = plan_memory(dataset, scene, options, threads);
+  const double fits = voxel_size_that_fits(dataset, scene, options, threads);
+  const std::string advice = fits > 0 ? formatted("--voxel-size %.4g would fit", fits)
+                                      : "no size of voxels would fit; see --images and --bounds";
+  return formatted("%.2f GiB where about %.2f GiB are needed for voxels of %.4g; %s", plan.limit_bytes / kGiB,
+                   plan.peak_bytes / kGiB, scene.voxel_size, advice.c_str());
+}
+
+void require_memory(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
+                    int threads) {
+  if (options.memory && !plan_memory(dataset, scene, options, threads).fits)
+    throw InvalidInput("--memory: found " + memory_shortage(dataset, scene, options, threads));
 }
 
 }  // namespace roxel

@@ -15,12 +15,28 @@ struct LevelEstimate {
 
 struct CostEstimate {
   std::vector<LevelEstimate> levels;
-  double memory_bytes = 0;  ///< largest resident memory
-  double seconds = 0;       ///< wall time on `threads` cores
+  MemoryPlan memory;
+  double seconds = 0;  ///< wall time on `threads` cores, where all samples stay in memory
 };
 
 /// `scene` is from lay_out() or survey(); `surround_count` decides whether its lattices are counted.
 CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
                            int threads);
+
+/// Shares out options.memory, or else what the machine has at hand: to what all levels need, then to samples,
+/// then to kept colours.
+MemoryPlan plan_memory(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
+                       int threads);
+
+/// Throws InvalidInput where options.memory is given and does not do.
+void require_memory(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
+                    int threads);
+
+/// For people, where a plan does not fit: what there is, what is needed, and what would fit.
+std::string memory_shortage(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
+                            int threads);
+
+/// Bytes of a pyramid of an image of so many pixels.
+double pyramid_bytes(double pixels, int finest_level);
 
 }  // namespace roxel

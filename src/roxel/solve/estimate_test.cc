@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "roxel/solve/cube_fixture.h"
 #include "roxel/solve/reconstruct.h"
 
@@ -50,13 +52,13 @@ TEST(EstimateCost, VoxelsAndStepsAreRoughlyThoseOfTheRun) {
 TEST(EstimateCost, GrowsWithWhatIsAskedFor) {
   const Dataset few = cube_dataset(6, 96), many = cube_dataset(24, 96), large = cube_dataset(6, 384);
   const CostEstimate base = estimated(few, options_at(64));
-  EXPECT_GT(base.memory_bytes, 1e8);
+  EXPECT_GT(base.memory.peak_bytes, 1e8);
   EXPECT_GT(base.seconds, 0);
   EXPECT_GT(estimated(large, options_at(128)).seconds, 2 * estimated(large, options_at(64)).seconds);
-  EXPECT_GT(estimated(few, options_at(128)).memory_bytes, base.memory_bytes);
+  EXPECT_GT(estimated(few, options_at(128)).memory.peak_bytes, base.memory.peak_bytes);
   EXPECT_GT(estimated(many, options_at(64)).seconds, 3 * base.seconds);
-  EXPECT_GT(estimated(many, options_at(64)).memory_bytes, base.memory_bytes);
-  EXPECT_GT(estimated(large, options_at(64)).memory_bytes, base.memory_bytes);
+  EXPECT_GT(estimated(many, options_at(64)).memory.peak_bytes, base.memory.peak_bytes);
+  EXPECT_GT(estimated(large, options_at(64)).memory.peak_bytes, base.memory.peak_bytes);
   ReconstructOptions more_passes = options_at(64);
   more_passes.passes = 32;
   EXPECT_GT(estimated(few, more_passes).seconds, 1.5 * base.seconds);
@@ -72,7 +74,63 @@ TEST(EstimateCost, ThreadsDivideTimeAndAddScratch) {
   const CostEstimate one = estimated(dataset, options_at(64), 1),
                      four = estimated(dataset, options_at(64), 4);
   EXPECT_DOUBLE_EQ(four.seconds, one.seconds / 4);
-  EXPECT_GT(four.memory_bytes, one.memory_bytes);
+  EXPECT_GT(four.memory.peak_bytes, one.memory.peak_bytes);
+}
+
+/// The plan for `options` where `memory` bytes may be had.
+MemoryPlan plan_within(double memory, const Dataset& dataset, ReconstructOptions options, int threads = 2) {
+  options.memory = memory / (1024.0 * 1024 * 1024);
+  return plan_memory(dataset, lay_out(dataset, cube_loader(), options), options, threads);
+}
+
+// Samples go before colours that are kept: what a pass cannot do without goes last, and is then said.
+TEST(PlanMemory, GivesUpWhatOnlySavesTimeFirst) {
+  const Dataset dataset = cube_dataset(64, 512);
+  const ReconstructOptions options = options_at(64);
+  const MemoryPlan ample = plan_within(64e9, dataset, options);
+  EXPECT_TRUE(ample.fits);
+  EXPECT_TRUE(std::isinf(ample.sample_bytes));
+  EXPECT_EQ(ample.kept_color_bytes, MemoryPlan().kept_color_bytes);
+  double last_samples = ample.sample_bytes, last_peak = ample.peak_bytes;
+  bool samples_given_up = false, fits = true;
+  for (double memory = ample.peak_bytes; fits; memory *= 0.97) {
+    const MemoryPlan plan = plan_within(memory, dataset, options);
+    fits = plan.fits;
+    if (fits) {
+      EXPECT_LE(plan.peak_bytes, memory * 1.000001);
+    }
+    EXPECT_LE(plan.sample_bytes, last_samples);
+    EXPECT_LE(plan.peak_bytes, last_peak * 1.1);  // nodes in flight are more than what is given up, at first
+    last_samples = plan.sample_bytes;
+    last_peak = plan.peak_bytes;
+    samples_given_up |= plan.sample_bytes < 1e6;
+  }
+  EXPECT_TRUE(samples_given_up);
+  EXPECT_LT(last_peak, 0.8 * ample.peak_bytes);
+}
+
+TEST(PlanMemory, AShortageNamesAVoxelSizeThatFits) {
+  const Dataset dataset = cube_dataset(12, 96);
+  ReconstructOptions options = options_at(512);
+  options.memory = 1;
+  const Scene scene = lay_out(dataset, cube_loader(), options);
+  const MemoryPlan plan = plan_memory(dataset, scene, options, 2);
+  ASSERT_FALSE(plan.fits);
+  const std::string text = memory_shortage(dataset, scene, options, 2);
+  const std::string before = "--voxel-size ";
+  ASSERT_NE(text.find(before), std::string::npos) << text;
+  options.voxel_size =
+      1.01 * std::stod(text.substr(text.find(before) + before.size()));  // four digits are said
+  EXPECT_TRUE(plan_memory(dataset, lay_out(dataset, cube_loader(), options), options, 2).fits) << text;
+  options.voxel_size = 0.9 * *options.voxel_size;
+  EXPECT_FALSE(plan_memory(dataset, lay_out(dataset, cube_loader(), options), options, 2).fits) << text;
+  options.memory = 0.1;
+  EXPECT_NE(memory_shortage(dataset, scene, options, 2).find("no size of voxels"), std::string::npos);
+}
+
+TEST(PlanMemory, WithoutALimitItIsTheMachines) {
+  EXPECT_GT(memory_at_hand(), 1e7);
+  EXPECT_LT(memory_at_hand(), 1e17);
 }
 
 }  // namespace

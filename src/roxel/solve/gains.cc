@@ -12,10 +12,10 @@ namespace roxel {
 
 namespace {
 
-constexpr int kSide = 96;            ///< pixels along the longer side at which views are compared
-constexpr float kCovered = 0.7f;     ///< opacity of a pixel that shows the volume
-constexpr float kDarkest = 0.01f;    ///< canonical; below, noise and black level decide the ratio
-constexpr float kBrightest = 0.98f;  ///< of a display image's full scale: clipped
+constexpr int kSide = 96;              ///< pixels along the longer side at which views are compared
+constexpr float kCovered = 0.7f;       ///< opacity of a pixel that shows the volume
+constexpr float kDarkestPair = 0.01f;  ///< canonical; below, noise and black level decide the ratio
+constexpr float kBrightest = 0.98f;    ///< of a display image's full scale: clipped
 constexpr std::size_t kFewestPixels = 32;
 constexpr double kHuber = 1.345;  ///< standard deviations: 95 % efficiency on Gaussian errors
 
@@ -86,7 +86,7 @@ std::optional<std::array<double, 3>> fit_view(const LatticeStack& stack,
 std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Rendering& rendering, int factor,
                                               double exposure) {
   const float clipped = exposure == 1 ? kBrightest : std::numeric_limits<float>::infinity();
-  const float darkest = kDarkest * static_cast<float>(exposure);
+  const float darkest = kDarkestPair * static_cast<float>(exposure);
   std::array<std::vector<double>, 3> ratios;
   for (int y = 0; y < rendering.opacity.height(); ++y)
     for (int x = 0; x < rendering.opacity.width(); ++x) {
@@ -128,12 +128,15 @@ GainFit fit_gains(const Volume& volume, const Dataset& dataset, const Photograph
     for (int c = 0; c < 3; ++c) mean[c] += logs[v][c] / views;
   }
   fit.of_views.resize(views);
+  double squares = 0;
   for (int v = 0; v < views; ++v)
     for (int c = 0; c < 3; ++c) {
       const double gain = std::exp(logs[v][c] - mean[c]);
+      squares += (logs[v][c] - mean[c]) * (logs[v][c] - mean[c]);
       fit.of_views[v][c] = static_cast<float>(gain);
       fit.largest_change = std::max(fit.largest_change, std::abs(gain / scene.light.of_view(v)[c] - 1));
     }
+  if (views > 0) fit.spread = std::sqrt(squares / (3.0 * views));
   return fit;
 }
 

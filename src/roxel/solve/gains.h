@@ -13,6 +13,7 @@ namespace roxel {
 struct GainFit {
   std::vector<std::array<float, 3>> of_views;  ///< geometric mean over the views 1 in every channel
   int fitted_views = 0;       ///< the others show too little of the volume, and keep what they had
+  double spread = 0;          ///< root mean square of their logarithms, over views and channels
   double largest_change = 0;  ///< of any view and channel, as a ratio less 1
 };
 

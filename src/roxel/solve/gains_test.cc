@@ -13,6 +13,8 @@ namespace {
 
 using fixture::cube_dataset;
 using fixture::CubeWorld;
+using fixture::lit_loader;
+using fixture::true_light;
 
 ReconstructOptions cube_options(IlluminationChoice illumination, Matching matching) {
   ReconstructOptions options;
@@ -23,23 +25,6 @@ ReconstructOptions cube_options(IlluminationChoice illumination, Matching matchi
   options.illumination = illumination;
   options.matching = matching;
   return options;
-}
-
-/// What the views' exposures and white balances are: up to a factor of about two apart.
-std::array<float, 3> true_light(int view) {
-  const float exposure = std::exp2(std::sin(2.4f * static_cast<float>(view)) / 2);
-  const float tint = 1 + 0.2f * std::sin(1.7f * static_cast<float>(view) + 1);
-  return {exposure * tint, exposure, exposure / tint};
-}
-
-/// Photographs of the cube with masks, each in its own light.
-PhotographLoader lit_loader(const Dataset& dataset) {
-  return [&dataset](const View& view) {
-    Photograph photo = CubeWorld::photograph(view.camera, std::array<float, 3>{0, 0, 0}, true);
-    const std::array<float, 3> light = true_light(static_cast<int>(&view - dataset.views.data()));
-    for (std::size_t i = 0; i < photo.rgb.data().size(); ++i) photo.rgb.data()[i] *= 0.4f * light[i % 3];
-    return photo;
-  };
 }
 
 /// Share of the cube's pixels whose depth is within half a voxel.
@@ -87,6 +72,29 @@ double mean_log_color(const Reconstruction& made) {
       sum += std::log(std::max(1e-3f, colors[slot][1]) / truth[1]), ++count;
     }
   return sum / count;
+}
+
+TEST(AutoIllumination, IsAGainWherePhotographsDifferAndNothingWhereTheyDoNot) {
+  const Dataset dataset = cube_dataset(8, 48);
+  ReconstructOptions options = cube_options(IlluminationChoice::kAuto, Matching::kAuto);
+  options.resolution = 64;  // its first level has 32 voxels along a side
+  // The light of lit_loader twice: up to a factor of four apart.
+  const PhotographLoader twice = [&, once = lit_loader(dataset)](const View& view) {
+    Photograph photo = once(view);
+    const std::array<float, 3> light = true_light(static_cast<int>(&view - dataset.views.data()));
+    for (std::size_t i = 0; i < photo.rgb.data().size(); ++i) photo.rgb.data()[i] *= light[i % 3];
+    return photo;
+  };
+  const Reconstruction lit = run(dataset, twice, options);
+  EXPECT_EQ(lit.scene.light.from, LightSource::kGain);
+  EXPECT_GT(lit.summary.light.front().spread, 0.35);
+  const Reconstruction constant =
+      run(dataset, fixture::cube_loader(std::array<float, 3>{0, 0, 0}, true), options);
+  EXPECT_EQ(constant.scene.light.from, LightSource::kNone);
+  ASSERT_EQ(constant.summary.light.size(), 1u);
+  EXPECT_LT(constant.summary.light.front().spread, 0.1);
+  options.resolution = 48;
+  EXPECT_TRUE(run(dataset, twice, options).summary.light.empty());  // too coarse to judge
 }
 
 TEST(FitGains, FindsTheLightOfEveryPhotograph) {

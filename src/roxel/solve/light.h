@@ -9,7 +9,7 @@
 
 namespace roxel {
 
-enum class IlluminationChoice { kAuto, kNone, kGain, kSky };
+enum class IlluminationChoice { kAuto, kNone, kGain, kSky, kSkyNormal };
 enum class Matching { kAuto, kCanonical, kLocal };
 
 /// Where a view's light comes from.
@@ -23,6 +23,7 @@ enum class LightSource {
 struct Light {
   std::vector<std::array<float, 3>> of_views;  ///< one a view; empty: 1 for all
   LightSource from = LightSource::kNone;
+  bool by_normal = false;       ///< kSky: voxels are painted by the light on their own surface
   bool local_matching = false;  ///< colours are compared without their neighbourhood's light
   double blur_deg = 5;          ///< standard deviation of that neighbourhood
 

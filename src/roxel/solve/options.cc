@@ -55,6 +55,13 @@ void add_volume(OptionTable<Options>& table) {
           "Ever coarser voxels around the box, out to the far distance, so that every ray has a place to "
           "end; "
           "auto: where the background is not known");
+  table.add("memory", &Options::memory)
+      .help(
+          "Keep to this much memory: samples that do not fit are made anew in each pass; results are the "
+          "same")
+      .unit("GiB")
+      .above(0)
+      .unset("what the machine has at hand");
 }
 
 void add_sampling(OptionTable<Options>& table) {
@@ -123,10 +130,22 @@ void add_light(OptionTable<Options>& table) {
            {{"auto", IlluminationChoice::kAuto},
             {"none", IlluminationChoice::kNone},
             {"gain", IlluminationChoice::kGain},
-            {"sky", IlluminationChoice::kSky}})
+            {"sky", IlluminationChoice::kSky},
+            {"sky-normal", IlluminationChoice::kSkyNormal}})
       .help(
           "Light that is divided out of the photographs: none, one gain an image and channel, or the light "
-          "of each node's sky; auto: sky where --sky is given, else none")
+          "of each node's sky; sky-normal: voxels are painted, too, without what light falls on their own "
+          "surface, shading and cast shadows; auto: sky where --sky is given or the photographs of several "
+          "times and places show it, gain where the images turn out to differ by more than a third, else "
+          "none")
+      .source("[Jethwa04] section 7.2.3; docs/light.md");
+  table
+      .add("sky-light", &Options::sky_light,
+           {{"horizontal", DomeLight::kHorizontal}, {"mean", DomeLight::kMean}})
+      .help(
+          "What the light of a sky is worth: what falls on the horizontal, the sun's included, or the plain "
+          "mean "
+          "of the dome")
       .source("[Jethwa04] section 7.2.3; docs/light.md");
   table
       .add("matching", &Options::matching,

@@ -9,6 +9,7 @@
 #include "roxel/base/option_table.h"
 #include "roxel/color/color_space.h"
 #include "roxel/infer/passes.h"
+#include "roxel/solve/daylight.h"
 #include "roxel/solve/light.h"
 
 namespace roxel {
@@ -29,6 +30,7 @@ struct ReconstructOptions {
   double tolerance = 1e-4;
   bool all_passes = false;
   SurroundChoice surround = SurroundChoice::kAuto;
+  std::optional<double> memory;  ///< GiB that the process may hold; changes no result
 
   // How images are sampled
   bool adaptive = true;
@@ -55,6 +57,7 @@ struct ReconstructOptions {
 
   // Light
   IlluminationChoice illumination = IlluminationChoice::kAuto;
+  DomeLight sky_light = DomeLight::kHorizontal;
   Matching matching = Matching::kAuto;
   double matching_blur = 5;  ///< degrees
 

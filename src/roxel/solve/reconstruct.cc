@@ -2,10 +2,12 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 
 #include "roxel/base/error.h"
 #include "roxel/infer/touch.h"
 #include "roxel/solve/gains.h"
+#include "roxel/solve/surface_paint.h"
 #include "roxel/volume/refine.h"
 
 namespace roxel {
@@ -106,21 +108,40 @@ class LevelSamples {
   const std::vector<SampleNode>& finest() const { return samples_; }
   const std::vector<SampleNode>& drafts() const { return drafts_; }
 
-  /// Gains anew from the volume's canonical colours; returns whether they moved.
+  /// The same by the light on each voxel's own surface.
+  SurfaceLight paint_by_normal(const Scene& scene, const Daylight& daylight, Volume& volume) const {
+    // What is known of a background is a colour of the matching space: here it may be anything.
+    PassOptions pass = pass_options(scene, options_);
+    if (pass.opacity.background.kind == BackgroundKind::kKnown)
+      pass.opacity.background.kind = BackgroundKind::kUnknown;
+    Scene in_passing = scene;
+    in_passing.memory.sample_bytes = 0;
+    const std::vector<SampleNode> samples =
+        make_samples(dataset_, load_, in_passing, voxel_size_, options_, context_, SampleColors::kRadiance);
+    return paint_without_daylight(dataset_, scene, daylight, samples, pass,
+                                  static_cast<float>(options_.opacity_threshold), context_, volume);
+  }
+
+  /// Gains anew from the volume's canonical colours; returns whether they moved. Where they did not, the
+  /// light stays the one that the samples were made in.
   bool fit_light(const Volume& volume, Scene& scene, LightRecord& record) {
     GainFit fit = fit_gains(volume, dataset_, load_, scene, context_);
-    scene.light.of_views = std::move(fit.of_views);
     record.fitted_views = fit.fitted_views;
     record.largest_change = fit.largest_change;
-    return fit.largest_change > kGainMoved;
+    record.spread = fit.spread;
+    const bool moved = fit.largest_change > kGainMoved;
+    if (moved) scene.light.of_views = std::move(fit.of_views);
+    return moved;
   }
 
   /// Gives the voxels the colours of canonical light: those that they are compared by may be others.
   void paint(const Scene& scene, Volume& volume) const {
     const LatticeStack stack(volume);
     const PassOptions pass = pass_options(scene, options_);
+    Scene in_passing = scene;
+    in_passing.memory.sample_bytes = 0;  // each is marched once: none need stay
     const std::vector<SampleNode> samples =
-        make_samples(dataset_, load_, scene, voxel_size_, options_, context_, SampleColors::kCanonical);
+        make_samples(dataset_, load_, in_passing, voxel_size_, options_, context_, SampleColors::kCanonical);
     CollectedColors colors(volume.slot_count(), samples.size(), 0);
     collect_color(stack, samples, pass, context_, nullptr, colors);
     update_color(colors.of_totals, context_.thread_count(), volume);
@@ -140,73 +161,242 @@ class LevelSamples {
 /// One level's passes.
 class LevelPasses {
  public:
-  LevelPasses(const ReconstructOptions& options, int level, bool first_ever, const RunContext& context,
+  LevelPasses(const ReconstructOptions& options, bool first_ever, const RunContext& context,
               LevelProgress& progress, const ReconstructHooks& hooks)
-      : options_(options),
-        level_(level),
-        first_ever_(first_ever),
-        context_(context),
-        progress_(progress),
-        hooks_(hooks) {}
+      : options_(options), first_ever_(first_ever), context_(context), progress_(progress), hooks_(hooks) {}
 
   /// Passes, the first of them drafts, until the opacities rest or the limit is reached; returns whether they
   /// rest. The last pass is never hurried, and no light changes after it: its opacities follow from its sums
-  /// alone, which `merge` relies on.
-  bool run(LevelSamples& samples, Scene& scene, Volume& volume, Summary& summary) {
-    int draft_passes = std::min(options_.draft_passes, options_.passes - 1);
-    Acceleration acceleration(volume.slot_count(), options_.acceleration, which_steps(scene));
-    bool resting = false;
-    for (int pass = 1; pass <= options_.passes; ++pass) {
-      const bool draft = pass <= draft_passes;
-      const bool last = resting || pass == options_.passes;
-      const PassRecord& record = run_one(pass, draft, draft ? samples.drafts() : samples.finest(), scene,
+  /// alone, which `merge` relies on. `between` is called where another pass follows.
+  bool run(LevelSamples& samples, Acceleration& acceleration, const std::function<void()>& between,
+           PassState& state, Scene& scene, Volume& volume, Summary& summary) {
+    for (;;) {
+      const bool draft = ++state.passes <= state.draft_passes;
+      const bool last = state.resting || state.passes == options_.passes;
+      const PassRecord& record = run_one(state, draft, draft ? samples.drafts() : samples.finest(), scene,
                                          last ? nullptr : &acceleration, volume, summary);
       const bool rests = record.mean_opacity_change < options_.tolerance;
-      if (last) return resting || rests;
-      if (scene.light.from == LightSource::kGain && !light_rests_)
-        fit_light(pass, samples, scene, volume, summary);
-      if (options_.all_passes || !rests) continue;
-      resting = !draft;
-      draft_passes = std::min(draft_passes, pass);  // drafts say no more: on to the samples themselves
+      if (last) return state.resting || rests;
+      if (scene.light.from == LightSource::kGain && !state.light_rests) {
+        memory_.release();
+        fit_light(state, samples, scene, volume, summary);
+      }
+      if (rests && !options_.all_passes) {
+        state.resting = !draft;
+        state.draft_passes = std::min(state.draft_passes, state.passes);  // drafts say no more
+      }
+      between();
     }
-    return false;
   }
 
  private:
-  const PassRecord& run_one(int pass, bool draft, const std::vector<SampleNode>& samples, const Scene& scene,
-                            Acceleration* acceleration, Volume& volume, Summary& summary) {
+  const PassRecord& run_one(const PassState& state, bool draft, const std::vector<SampleNode>& samples,
+                            const Scene& scene, Acceleration* acceleration, Volume& volume,
+                            Summary& summary) {
     const auto start = Clock::now();
     PassOptions pass_opts = pass_options(scene, options_);
-    pass_opts.everywhere = first_ever_ && pass == 1;
+    pass_opts.everywhere = first_ever_ && state.passes == 1;
     const PassReport report = run_pass(
-        samples, pass_opts, context_, [&](double fraction) { progress_.report(level_, pass, fraction); },
-        volume, acceleration);
-    summary.passes.push_back(make_record(level_, pass, draft, volume, report, seconds_since(start)));
+        samples, pass_opts, context_,
+        [&](double fraction) { progress_.report(state.level, state.passes, fraction); }, volume, acceleration,
+        &memory_);
+    summary.passes.push_back(
+        make_record(state.level, state.passes, draft, volume, report, seconds_since(start)));
     if (!std::isfinite(report.opacity.log_likelihood))
-      throw NumericalError("level " + std::to_string(level_) + ", pass " + std::to_string(pass) +
+      throw NumericalError("level " + std::to_string(state.level) + ", pass " + std::to_string(state.passes) +
                            ": the log-likelihood is not finite; --noise, --outlier or --uninformative are "
                            "far from what colours are like");
     if (hooks_.after_pass) hooks_.after_pass(summary.passes.back());
     return summary.passes.back();
   }
 
-  void fit_light(int pass, LevelSamples& samples, Scene& scene, Volume& volume, Summary& summary) {
+  static void fit_light(PassState& state, LevelSamples& samples, Scene& scene, Volume& volume,
+                        Summary& summary) {
     if (scene.light.local_matching) samples.paint(scene, volume);
     LightRecord record;
-    record.level = level_;
-    record.pass = pass;
-    light_rests_ = !samples.fit_light(volume, scene, record);
-    if (!light_rests_) samples.make(scene);
+    record.level = state.level;
+    record.pass = state.passes;
+    state.light_rests = !samples.fit_light(volume, scene, record);
+    if (!state.light_rests) samples.make(scene);
     summary.light.push_back(record);
   }
 
   const ReconstructOptions& options_;
-  const int level_;
   const bool first_ever_;
   const RunContext& context_;
   LevelProgress& progress_;
   const ReconstructHooks& hooks_;
-  bool light_rests_ = false;
+  PassMemory memory_;
+};
+
+/// Photographs whose gains differ by more than this (root mean square of their logarithms) were taken in
+/// different light; in one light 0.00 to 0.24 have been measured, 0.65 for tourists' photographs, for what
+/// shines and for what the first level cannot resolve.
+constexpr double kLightDiffers = 0.35;
+
+/// A volume of fewer voxels along its longest side says more of its own coarseness than of light: a world in
+/// one light had gains that differ by half on 8 voxels, by a third on 24.
+constexpr double kFewestVoxels = 32;
+
+/// The first level but the last that is fine enough to compare photographs with; none: 0.
+int level_to_judge_light(const Scene& scene, const ReconstructOptions& options) {
+  const double finest = scene.bounds.box.sizes().maxCoeff() / scene.voxel_size;
+  for (int level = 1; level < options.levels; ++level)
+    if (std::ldexp(finest, level - options.levels) >= kFewestVoxels * (1 - 1e-6)) return level;
+  return 0;
+}
+
+/// What --illumination auto knows once there is a first volume: how far the photographs' brightness and
+/// tint are apart.
+void choose_gain(const Dataset& dataset, const PhotographLoader& load, const Volume& volume,
+                 const RunContext& context, int level, Scene& scene, Summary& summary) {
+  GainFit fit = fit_gains(volume, dataset, load, scene, context);
+  const bool differs = fit.spread > kLightDiffers;
+  char note[160];
+  std::snprintf(note, sizeof note, "light: the images' gains differ by %.0f %% after level %d: %s",
+                100 * fit.spread, level,
+                differs ? "one gain an image is divided out" : "nothing is divided out");
+  summary.notes.push_back(note);
+  LightRecord record;
+  record.level = level;
+  record.fitted_views = fit.fitted_views;
+  record.largest_change = fit.largest_change;
+  record.spread = fit.spread;
+  summary.light.push_back(record);
+  if (!differs) return;
+  scene.light.from = LightSource::kGain;
+  scene.light.of_views = std::move(fit.of_views);
+}
+
+PassState start_of_level(int level, const ReconstructOptions& options) {
+  PassState state;
+  state.level = level;
+  state.draft_passes = std::min(options.draft_passes, options.passes - 1);
+  return state;
+}
+
+/// Levels one after the other, from nothing or from a checkpoint.
+class Levels {
+ public:
+  Levels(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
+         RunContext& context, const ReconstructHooks& hooks, double progress_share, Clock::time_point start,
+         Reconstruction& made)
+      : dataset_(dataset),
+        load_(load),
+        options_(options),
+        context_(context),
+        hooks_(hooks),
+        progress_(options, context, progress_share),
+        start_(start),
+        made_(made) {}
+
+  void run() {
+    if (hooks_.daylight) daylight_ = *hooks_.daylight;
+    PassState state = start_of_level(1, options_);
+    if (hooks_.resume) state = take_over();
+    for (;; state = start_of_level(state.level + 1, options_)) {
+      if (!state.level_done) run_level(state);
+      finish_level(state);
+      if (state.level == options_.levels) break;
+    }
+    made_.summary.seconds = seconds_so_far();
+  }
+
+ private:
+  PassState take_over() {
+    Checkpoint& from = *hooks_.resume;
+    made_.volume = std::move(from.volume);
+    made_.summary = std::move(from.summary);
+    made_.scene.light.of_views = std::move(from.light);
+    made_.scene.light.from = from.state.light_from;
+    if (from.state.level > 1 && hooks_.recall_skies) daylight_ = hooks_.recall_skies();
+    seconds_before_ = made_.summary.seconds;
+    made_.summary.notes.push_back("resumed after level " + std::to_string(from.state.level) + ", pass " +
+                                  std::to_string(from.state.passes));
+    return from.state;
+  }
+
+  void run_level(PassState& state) {
+    const auto level_start = Clock::now();
+    const double earlier = state.level_seconds;
+    const double voxel_size = std::ldexp(made_.scene.voxel_size, options_.levels - state.level);
+    LevelSamples samples(dataset_, load_, options_, context_, voxel_size);
+    samples.make(made_.scene);
+    if (state.passes == 0) make_topology(state.level, samples.finest());
+    Acceleration acceleration(made_.volume.slot_count(), options_.acceleration, which_steps(made_.scene));
+    if (state.passes > 0) acceleration.recall(std::move(hooks_.resume->accelerated));
+    const auto offer_checkpoint = [&] {
+      state.level_seconds = earlier + seconds_since(level_start);
+      state.light_from = made_.scene.light.from;
+      made_.summary.seconds = seconds_so_far();
+      if (hooks_.checkpoint)
+        hooks_.checkpoint(
+            {state, made_.summary, made_.scene.light.of_views, acceleration.memory(), made_.volume});
+    };
+    const bool first_ever = state.level == 1 && !hooks_.initial;
+    LevelRecord record;
+    record.voxel_size = voxel_size;
+    record.voxels_in_box = made_.volume.box_slot_count();
+    record.voxels_around = made_.volume.slot_count() - made_.volume.box_slot_count();
+    record.converged =
+        LevelPasses(options_, first_ever, context_, progress_, hooks_)
+            .run(samples, acceleration, offer_checkpoint, state, made_.scene, made_.volume, made_.summary);
+    record.seconds = earlier + seconds_since(level_start);
+    made_.summary.levels.push_back(record);
+    state.level_done = true;
+    acceleration.recall({});  // of no use to the next level
+    offer_checkpoint();
+  }
+
+  /// What follows a level's passes and needs no checkpoint of its own: light that is chosen or found by the
+  /// first of several levels, and the colours of the last.
+  void finish_level(const PassState& state) {
+    const auto start = Clock::now();
+    Scene& scene = made_.scene;
+    const LevelSamples samples(dataset_, load_, options_, context_,
+                               std::ldexp(scene.voxel_size, options_.levels - state.level));
+    if (state.level == options_.levels) {
+      if (scene.light.by_normal)
+        made_.surface_light = samples.paint_by_normal(scene, *daylight_, made_.volume);
+      else if (scene.light.local_matching)
+        samples.paint(scene, made_.volume);
+    }
+    if (options_.illumination == IlluminationChoice::kAuto && scene.light.from == LightSource::kNone &&
+        state.level == level_to_judge_light(scene, options_)) {
+      if (scene.light.local_matching) samples.paint(scene, made_.volume);
+      choose_gain(dataset_, load_, made_.volume, context_, state.level, scene, made_.summary);
+    }
+    if (hooks_.look_at_skies_again && state.level == 1 && options_.levels > 1 &&
+        scene.light.from == LightSource::kSky)
+      look_at_skies_again();
+    made_.summary.levels.back().seconds += seconds_since(start);
+    if (hooks_.after_level) hooks_.after_level(made_.volume, scene, made_.summary);
+  }
+
+  void look_at_skies_again() {
+    std::optional<Daylight> again = hooks_.look_at_skies_again(made_.volume, made_.scene);
+    if (!again) return;
+    daylight_ = std::move(again);
+    made_.scene.light.of_views = light_of_views(*daylight_, options_.sky_light);
+  }
+
+  void make_topology(int level, const std::vector<SampleNode>& samples) {
+    made_.volume = level == 1 ? first_volume(made_.scene, samples, options_, context_, hooks_.initial)
+                              : refine(made_.volume, refine_options(options_), context_.thread_count());
+  }
+
+  double seconds_so_far() const { return seconds_before_ + seconds_since(start_); }
+
+  const Dataset& dataset_;
+  const PhotographLoader& load_;
+  const ReconstructOptions& options_;
+  RunContext& context_;
+  const ReconstructHooks& hooks_;
+  LevelProgress progress_;
+  const Clock::time_point start_;
+  double seconds_before_ = 0;  ///< of the run that a checkpoint is from
+  Reconstruction& made_;
+  std::optional<Daylight> daylight_;
 };
 
 }  // namespace
@@ -224,6 +414,7 @@ PassOptions pass_options(const Scene& scene, const ReconstructOptions& options) 
   pass.prior.strength = options.prior_strength;
   pass.prior.spatial_lambda = options.spatial_prior;
   pass.predictive = options.predictive;
+  pass.kept_color_bytes = static_cast<std::size_t>(scene.memory.kept_color_bytes);
   return pass;
 }
 
@@ -266,29 +457,8 @@ Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
   if (hooks.after_survey) hooks.after_survey(result.scene);
   summary.stages.push_back({"survey", seconds_since(start), peak_memory_bytes()});
 
-  LevelProgress progress(options, context, progress_share);
-  for (int level = 1; level <= options.levels; ++level) {
-    const auto level_start = Clock::now();
-    const double voxel_size = std::ldexp(result.scene.voxel_size, options.levels - level);
-    LevelSamples samples(dataset, load, options, context, voxel_size);
-    samples.make(result.scene);
-    result.volume = level == 1 ? first_volume(result.scene, samples.finest(), options, context, hooks.initial)
-                               : refine(result.volume, refine_options(options), context.thread_count());
-    LevelRecord record;
-    record.voxel_size = voxel_size;
-    record.voxels_in_box = result.volume.box_slot_count();
-    record.voxels_around = result.volume.slot_count() - result.volume.box_slot_count();
-    const bool first_ever = level == 1 && !hooks.initial;
-    record.converged = LevelPasses(options, level, first_ever, context, progress, hooks)
-                           .run(samples, result.scene, result.volume, summary);
-    if (result.scene.light.local_matching && level == options.levels)
-      samples.paint(result.scene, result.volume);
-    record.seconds = seconds_since(level_start);
-    summary.levels.push_back(record);
-    if (hooks.after_level) hooks.after_level(result.volume, result.scene, summary);
-  }
+  Levels(dataset, load, options, context, hooks, progress_share, start, result).run();
   summary.termination = summary.levels.back().converged ? "converged" : "pass limit";
-  summary.seconds = seconds_since(start);
   summary.peak_memory_bytes = peak_memory_bytes();
   return result;
 }

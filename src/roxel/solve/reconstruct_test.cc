@@ -10,6 +10,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/solve/cube_fixture.h"
+#include "roxel/solve/estimate.h"
 #include "roxel/solve/run_stages.h"
 
 namespace roxel {
@@ -26,6 +27,16 @@ ReconstructOptions cube_options() {
   options.levels = 2;
   options.passes = 4;
   return options;
+}
+
+/// The least of --memory, in GiB, that a run of these options takes.
+double least_memory(const Dataset& dataset, const Scene& scene, ReconstructOptions options) {
+  double low = 0, high = 64;
+  while (high - low > 1e-6 * high) {
+    options.memory = (low + high) / 2;
+    (plan_memory(dataset, scene, options, 2).fits ? high : low) = *options.memory;
+  }
+  return high;
 }
 
 struct Hits {
@@ -109,6 +120,45 @@ TEST(Reconstruct, IsTheSameForAnyNumberOfThreads) {
     EXPECT_EQ(many.volume.support, one.volume.support);
     ASSERT_EQ(many.summary.passes.size(), one.summary.passes.size());
     EXPECT_EQ(many.summary.passes.back().mean_log_likelihood, one.summary.passes.back().mean_log_likelihood);
+  }
+}
+
+// Samples that do not stay in memory are loaded again and again, and change nothing.
+TEST(Reconstruct, IsTheSameForAnyMemory) {
+  const Dataset dataset = cube_dataset(7, 48);
+  ReconstructOptions options = cube_options();
+  options.resolution = 16;
+  const auto run = [&](std::optional<double> memory, std::atomic<int>& loads) {
+    options.memory = memory;
+    const PhotographLoader load = [&](const View& view) {
+      ++loads;
+      return cube_loader()(view);
+    };
+    RunContext context(2);
+    return reconstruct(dataset, load, options, context);
+  };
+  std::atomic<int> few{0}, many{0};
+  const Reconstruction ample = run(std::nullopt, few);
+  const Reconstruction tight = run(1.0001 * least_memory(dataset, ample.scene, options), many);
+  EXPECT_LT(tight.scene.memory.sample_bytes, 1e5);
+  EXPECT_GT(many, 2 * few);
+  EXPECT_EQ(tight.volume.tau, ample.volume.tau);
+  EXPECT_EQ(tight.volume.color_mean, ample.volume.color_mean);
+  EXPECT_EQ(tight.volume.support, ample.volume.support);
+}
+
+TEST(Reconstruct, TooLittleMemoryIsSaidBeforeAnyPass) {
+  ReconstructOptions options = cube_options();
+  options.memory = 0.05;
+  RunContext context(2);
+  ReconstructHooks hooks;
+  hooks.after_pass = [](const PassRecord&) { FAIL(); };
+  try {
+    reconstruct(cube_dataset(6, 24), cube_loader(), options, context, hooks);
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_NE(std::string(error.what()).find("--memory: found 0.05 GiB where about "), std::string::npos)
+        << error.what();
   }
 }
 

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "roxel/base/parallel.h"
+#include "roxel/solve/surface_paint.h"
 
 namespace roxel {
 namespace {
@@ -18,6 +19,7 @@ class ViewStages {
       : dataset_(dataset),
         load_(load),
         scene_(reconstruction.scene),
+        surface_light_(reconstruction.surface_light ? &*reconstruction.surface_light : nullptr),
         stages_(stages),
         context_(context),
         stack_(reconstruction.volume),
@@ -40,7 +42,8 @@ class ViewStages {
       if (stages_.depth) add_depth(node, worker, results);
       for (ViewResult& result : results) {
         if (stages_.render && !stages_.depth) result.rendering = render_view(result.view_idx);
-        put_into_light_of(result.view_idx, result.rendering.rgb);
+        result.view_light = scene_.light.of_view(result.view_idx);
+        if (stages_.render) put_into_light_of(result);
         visit(result);
         report_one();
       }
@@ -60,8 +63,10 @@ class ViewStages {
       full.push_back(make_full_view(dataset_, result.view_idx, result.photo, scene_));
     if (!scratch_[worker]) scratch_[worker] = std::make_unique<NodeScratch>(stack_, stack_.volume().tau);
     scratch_[worker]->reset();
-    compare_with_others(stack_, samples_, node, pass_, collected_, context_, *scratch_[worker]);
-    const RenderBeside beside{colors_, render_options()};
+    compare_with_others(stack_, resident(samples_[node]), node, pass_, collected_, context_,
+                        *scratch_[worker]);
+    const std::vector<std::array<float, 3>> colors = colors_for(results.front().view_idx);
+    const RenderBeside beside{colors, render_options()};
     std::vector<SeenView> seen =
         estimate_depth(stack_, full, pass_, stages_.depth_options, stages_.render ? &beside : nullptr,
                        context_, *scratch_[worker]);
@@ -78,14 +83,27 @@ class ViewStages {
   }
 
   Rendering render_view(int view_idx) const {
-    return render(stack_, colors_, dataset_.views[view_idx].camera, view_range(scene_, dataset_, view_idx),
-                  render_options(), context_);
+    return render(stack_, colors_for(view_idx), dataset_.views[view_idx].camera,
+                  view_range(scene_, dataset_, view_idx), render_options(), context_);
+  }
+
+  /// Colours that the view is rendered with: in the light on their own surface where that is known, else
+  /// canonical.
+  std::vector<std::array<float, 3>> colors_for(int view_idx) const {
+    return surface_light_ ? in_light_of(*surface_light_, surface_light_->sky_of_view(view_idx), colors_)
+                          : colors_;
   }
 
   /// Canonical colours as the view's photograph shows them.
-  void put_into_light_of(int view_idx, Image& rgb) const {
-    const std::array<float, 3> light = scene_.light.of_view(view_idx);
-    for (std::size_t i = 0; i < rgb.data().size(); ++i) rgb.data()[i] *= light[i % 3];
+  void put_into_light_of(ViewResult& result) const {
+    if (surface_light_) {
+      const PinholeCamera& camera = dataset_.views[result.view_idx].camera;
+      result.light = light_of_pixels(stack_, *surface_light_, surface_light_->sky_of_view(result.view_idx),
+                                     camera, view_range(scene_, dataset_, result.view_idx), context_);
+      return;
+    }
+    Image& rgb = result.rendering.rgb;
+    for (std::size_t i = 0; i < rgb.data().size(); ++i) rgb.data()[i] *= result.view_light[i % 3];
   }
 
   void report_one() {
@@ -99,6 +117,7 @@ class ViewStages {
   const Dataset& dataset_;
   const PhotographLoader& load_;
   const Scene& scene_;
+  const SurfaceLight* surface_light_;
   const ViewStageOptions& stages_;
   RunContext& context_;
   LatticeStack stack_;

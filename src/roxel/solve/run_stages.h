@@ -23,6 +23,8 @@ struct ViewResult {
   Photograph photo;
   DepthMap depth;       ///< empty planes where depth was not asked for
   Rendering rendering;  ///< rgb in the photograph's unit; empty where not asked for
+  Image light;  ///< what each pixel is to be divided by, 0 = not known; empty where view_light serves all
+  std::array<float, 3> view_light = {1, 1, 1};
 };
 
 /// Calls visit for every view, from several threads at once, never twice at once for views of one node. At

@@ -8,6 +8,7 @@
 #include "roxel/base/parallel.h"
 #include "roxel/dataset/box_visibility.h"
 #include "roxel/solve/background_choice.h"
+#include "roxel/solve/estimate.h"
 
 namespace roxel {
 
@@ -84,6 +85,11 @@ double choose_exposure(std::vector<float> luminances, std::vector<std::string>& 
 Image sample_image(const Dataset& dataset, int view_idx, const Photograph& photo, const Scene& scene,
                    SampleColors colors) {
   const double focal_px = dataset.views[view_idx].camera.intrinsics.fx;
+  if (colors == SampleColors::kRadiance) {
+    Image samples = canonical_image(photo, view_idx, scene.exposure, Light{});
+    for (float& value : samples.data()) value = std::clamp(value, 0.0f, kLargestComponent);
+    return samples;
+  }
   Image samples = colors == SampleColors::kCanonical
                       ? canonical_image(photo, view_idx, scene.exposure, scene.light)
                       : matching_image(photo, view_idx, focal_px, scene.exposure, scene.light);
@@ -97,10 +103,13 @@ Image sample_image(const Dataset& dataset, int view_idx, const Photograph& photo
 void choose_light(const Daylight* daylight, const ReconstructOptions& options, Scene& scene) {
   Light& light = scene.light;
   const IlluminationChoice choice = options.illumination;
-  if (choice == IlluminationChoice::kSky || (choice == IlluminationChoice::kAuto && daylight)) {
-    if (daylight) light.of_views = light_of_views(*daylight);
-    if (light.of_views.empty() && choice == IlluminationChoice::kSky)
-      throw_invalid("--illumination sky", "no photograph whose sky is known",
+  light.by_normal = choice == IlluminationChoice::kSkyNormal;
+  const bool wanted = choice == IlluminationChoice::kSky || light.by_normal;
+  if (wanted || (choice == IlluminationChoice::kAuto && daylight)) {
+    if (daylight) light.of_views = light_of_views(*daylight, options.sky_light);
+    if (light.of_views.empty() && wanted)
+      throw_invalid(light.by_normal ? "--illumination sky-normal" : "--illumination sky",
+                    "no photograph whose sky is known",
                     "photographs that show the sky, or --illumination gain");
   }
   light.from = !light.of_views.empty()               ? LightSource::kSky
@@ -109,6 +118,7 @@ void choose_light(const Daylight* daylight, const ReconstructOptions& options, S
   light.local_matching = options.matching == Matching::kLocal ||
                          (options.matching == Matching::kAuto && light.from == LightSource::kSky);
   if (light.from == LightSource::kSky) scene.notes.push_back("light: that of each view's sky is divided out");
+  if (light.by_normal) scene.notes.push_back("light: voxels are painted without shading and cast shadows");
   if (light.local_matching) scene.notes.push_back("matching: without the light of the neighbourhood");
 }
 
@@ -162,6 +172,17 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
   return scene;
 }
 
+namespace {
+
+void share_out_memory(const Dataset& dataset, const ReconstructOptions& options, int threads, Scene& scene) {
+  require_memory(dataset, scene, options, threads);
+  scene.memory = plan_memory(dataset, scene, options, threads);
+  if (!scene.memory.fits)
+    scene.warnings.push_back("memory: " + memory_shortage(dataset, scene, options, threads));
+}
+
+}  // namespace
+
 Scene survey(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
              const RunContext& context, const Daylight* daylight) {
   Scene scene = lay_out(dataset, load, options);
@@ -188,6 +209,7 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
   scene.surround_count = surround ? count_surround(dataset, scene.bounds) : 0;
   if (surround)
     scene.notes.push_back("surround: " + std::to_string(scene.surround_count) + " lattices around the box");
+  share_out_memory(dataset, options, context.thread_count(), scene);
   return scene;
 }
 
@@ -209,26 +231,50 @@ Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx) {
   return range;
 }
 
+namespace {
+
+/// The first views, as many as there is room for.
+std::vector<bool> which_stay(const std::vector<SampleView>& views, const MemoryPlan& memory) {
+  std::vector<bool> stay(views.size());
+  double bytes = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const Intrinsics& k = views[v].camera.intrinsics;
+    bytes += pyramid_bytes(static_cast<double>(k.width) * k.height, views[v].plan.finest_level);
+    stay[v] = bytes <= memory.sample_bytes;
+  }
+  return stay;
+}
+
+}  // namespace
+
 std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
                                      double voxel_size, const ReconstructOptions& options,
                                      const RunContext& context, SampleColors colors) {
   std::vector<SampleView> views(dataset.views.size());
-  parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
-    context.throw_if_cancelled();
+  SamplePlanOptions plan_options;
+  plan_options.samples_per_voxel = options.samples_per_voxel;
+  plan_options.adaptive = options.adaptive;
+  for (std::size_t v = 0; v < views.size(); ++v) {
     SampleView& view = views[v];
     view.camera = dataset.views[v].camera;
-    SamplePlanOptions plan_options;
-    plan_options.samples_per_voxel = options.samples_per_voxel;
-    plan_options.adaptive = options.adaptive;
-    view.plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size, view_range(scene, dataset, v),
-                                 plan_options);
+    view.plan = make_sample_plan(view.camera, scene.bounds.box, voxel_size,
+                                 view_range(scene, dataset, static_cast<int>(v)), plan_options);
     view.draft_plan = view.plan.coarser();
     const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
     view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
-    const Photograph photo = load(dataset.views[v]);
-    view.pyramid = std::make_shared<SamplePyramid>(
-        sample_image(dataset, static_cast<int>(v), photo, scene, colors), photo.valid, photo.foreground,
-        view.plan.finest_level, view.draft_plan.root_level);
+  }
+  const std::vector<bool> stay = which_stay(views, scene.memory);
+  parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
+    context.throw_if_cancelled();
+    SampleView& view = views[v];
+    view.make_pyramid = [&dataset, &load, &scene, v, colors, finest = view.plan.finest_level,
+                         root = view.draft_plan.root_level] {
+      const Photograph photo = load(dataset.views[v]);
+      return std::make_shared<const SamplePyramid>(
+          sample_image(dataset, static_cast<int>(v), photo, scene, colors), photo.valid, photo.foreground,
+          finest, root);
+    };
+    if (stay[v]) view.pyramid = view.make_pyramid();
   });
   std::vector<SampleNode> nodes(dataset.nodes.size());
   for (std::size_t v = 0; v < views.size(); ++v)

@@ -4,6 +4,7 @@
 #include "roxel/base/run_context.h"
 #include "roxel/dataset/bounds.h"
 #include "roxel/solve/daylight.h"
+#include "roxel/solve/memory_plan.h"
 #include "roxel/solve/options.h"
 
 namespace roxel {
@@ -18,6 +19,7 @@ struct Scene {
   Light light;                    ///< divided out of the photographs
   MatchModel model;
   Background background;
+  MemoryPlan memory;
   std::vector<std::string> notes;     ///< what was chosen and why, for people
   std::vector<std::string> warnings;  ///< what is likely to be a mistake, and what to change
 };
@@ -35,10 +37,11 @@ Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const Recons
 std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options);
 
 /// Which of a photograph's colours samples hold: those that rays and voxels are compared by, or those that
-/// voxels are painted with.
-enum class SampleColors { kMatching, kCanonical };
+/// voxels are painted with, or linear RGB over the exposure, whatever the light.
+enum class SampleColors { kMatching, kCanonical, kRadiance };
 
-/// Loads all views, and prepares their samples for voxels of `voxel_size`.
+/// Prepares the samples of all views for voxels of `voxel_size`. Those that scene.memory has no room for come
+/// without pyramids and make them when asked: they need `dataset`, `load` and `scene` to stay as they are.
 std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
                                      double voxel_size, const ReconstructOptions& options,
                                      const RunContext& context,

@@ -16,7 +16,7 @@ using fixture::cube_loader;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-ReconstructOptions cube_options() {
+ReconstructOptions surveyed_options() {
   ReconstructOptions options;
   options.bounds = {-0.8, -0.8, -0.8, 0.8, 0.8, 0.8};
   options.resolution = 32;
@@ -29,23 +29,23 @@ Scene surveyed(const ReconstructOptions& options, const PhotographLoader& load) 
 }
 
 TEST(Survey, TakesTheGivenBoxAndItsVoxelSize) {
-  const Scene scene = surveyed(cube_options(), cube_loader());
+  const Scene scene = surveyed(surveyed_options(), cube_loader());
   EXPECT_EQ(scene.bounds.box.max(), Eigen::Vector3d::Constant(0.8));
   EXPECT_DOUBLE_EQ(scene.voxel_size, 1.6 / 32);
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   options.voxel_size = 0.03;
   EXPECT_DOUBLE_EQ(surveyed(options, cube_loader()).voxel_size, 0.03);
 }
 
 TEST(Survey, WarnsOfABoxThatNoCameraSees) {
-  EXPECT_THAT(surveyed(cube_options(), cube_loader()).warnings, ::testing::IsEmpty());
-  ReconstructOptions options = cube_options();
+  EXPECT_THAT(surveyed(surveyed_options(), cube_loader()).warnings, ::testing::IsEmpty());
+  ReconstructOptions options = surveyed_options();
   options.bounds = {100, 100, 100, 101, 101, 101};
   EXPECT_THAT(surveyed(options, cube_loader()).warnings, ::testing::Not(::testing::IsEmpty()));
 }
 
 TEST(Survey, RefusesMoreLevelsThanTheFinestLatticeHasRoomFor) {
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   options.levels = 16;
   try {
     surveyed(options, cube_loader());
@@ -56,32 +56,32 @@ TEST(Survey, RefusesMoreLevelsThanTheFinestLatticeHasRoomFor) {
 }
 
 TEST(Survey, RefusesAbsurdVoxelSizes) {
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   options.voxel_size = 1e-6;
   EXPECT_THROW(surveyed(options, cube_loader()), InvalidInput);
 }
 
 TEST(Survey, ChoosesTheBackgroundFromTheImages) {
-  EXPECT_EQ(surveyed(cube_options(), cube_loader()).background.kind, BackgroundKind::kKnown);
-  EXPECT_EQ(surveyed(cube_options(), cube_loader(std::array{0.0f, 0.0f, 0.0f}, true)).background.kind,
+  EXPECT_EQ(surveyed(surveyed_options(), cube_loader()).background.kind, BackgroundKind::kKnown);
+  EXPECT_EQ(surveyed(surveyed_options(), cube_loader(std::array{0.0f, 0.0f, 0.0f}, true)).background.kind,
             BackgroundKind::kMask);
 }
 
 TEST(Survey, DisplayWhiteIsTheExposureOfOrdinaryImages) {
-  EXPECT_EQ(surveyed(cube_options(), cube_loader()).exposure, 1);
+  EXPECT_EQ(surveyed(surveyed_options(), cube_loader()).exposure, 1);
 }
 
 // Radiance 50 times above white: the exposure brings the median to middle grey, and colours with it.
 TEST(Survey, HighDynamicRangeGetsAnExposure) {
-  const Scene one = surveyed(cube_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 50));
+  const Scene one = surveyed(surveyed_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 50));
   EXPECT_GT(one.exposure, 10);
   EXPECT_THAT(one.notes, Contains(HasSubstr("exposure")));
-  const Scene ten = surveyed(cube_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 500));
+  const Scene ten = surveyed(surveyed_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 500));
   EXPECT_NEAR(ten.exposure / one.exposure, 10, 1e-4);
 }
 
 TEST(Survey, ABackgroundOfHighDynamicRangeIsMeasuredUnderTheExposure) {
-  const Scene scene = surveyed(cube_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 50));
+  const Scene scene = surveyed(surveyed_options(), cube_loader(std::array{0.3f, 0.3f, 0.3f}, false, 50));
   ASSERT_EQ(scene.background.kind, BackgroundKind::kKnown);
   const float grey = static_cast<float>(0.3 * 50 / scene.exposure);
   float expected[3] = {grey, grey, grey};
@@ -90,10 +90,10 @@ TEST(Survey, ABackgroundOfHighDynamicRangeIsMeasuredUnderTheExposure) {
 }
 
 TEST(Survey, WhitePointAndSpaceAreThoseAskedFor) {
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   options.white_point = "A";
   const Scene warm = surveyed(options, cube_loader());
-  const Scene plain = surveyed(cube_options(), cube_loader());
+  const Scene plain = surveyed(surveyed_options(), cube_loader());
   const float grey[3] = {0.5f, 0.5f, 0.5f};
   float under_a[3], under_d65[3];
   warm.transform.from_rgb(grey, under_a);
@@ -109,7 +109,7 @@ TEST(Survey, WhitePointAndSpaceAreThoseAskedFor) {
 }
 
 TEST(Survey, ModelFollowsTheOptions) {
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   options.noise = 6;
   options.outlier = 1e-5;
   options.evidence_half = 0.4;
@@ -126,7 +126,7 @@ TEST(Survey, ModelFollowsTheOptions) {
 }
 
 TEST(Survey, SurroundReachesAsFarAsRaysDo) {
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   options.far = 40;
   for (const SurroundChoice choice : {SurroundChoice::kOn, SurroundChoice::kAuto}) {
     options.surround = choice;
@@ -148,7 +148,7 @@ TEST(Survey, SurroundReachesAsFarAsRaysDo) {
 }
 
 TEST(Survey, SurroundIsForBackgroundsThatAreNotKnown) {
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   EXPECT_EQ(surveyed(options, cube_loader()).surround_count, 0);  // auto, black background found
   options.surround = SurroundChoice::kOn;
   EXPECT_GT(surveyed(options, cube_loader()).surround_count, 0);
@@ -159,7 +159,7 @@ TEST(Survey, SurroundIsForBackgroundsThatAreNotKnown) {
 
 TEST(ViewRange, EndsBehindTheBoxWithoutSurround) {
   const Dataset dataset = cube_dataset(6, 24);
-  const Scene scene = surveyed(cube_options(), cube_loader());
+  const Scene scene = surveyed(surveyed_options(), cube_loader());
   const Stretch range = view_range(scene, dataset, 0);
   double farthest = 0, nearest = 1e9;
   for (int corner = 0; corner < 8; ++corner) {
@@ -179,7 +179,7 @@ TEST(ViewRange, EndsBehindTheBoxWithoutSurround) {
 
 TEST(MakeSamples, FollowTheLoaderNodesAndWeights) {
   const Dataset dataset = cube_dataset(6, 24);
-  ReconstructOptions options = cube_options();
+  ReconstructOptions options = surveyed_options();
   const Scene scene = survey(dataset, cube_loader(), options, RunContext(1));
   const std::vector<SampleNode> nodes =
       make_samples(dataset, cube_loader(), scene, 0.1, options, RunContext(2));
@@ -199,7 +199,7 @@ TEST(MakeSamples, FollowTheLoaderNodesAndWeights) {
 
 TEST(MakeSamples, SmallVoxelsNeverWeighPixelsMoreThanOnce) {
   const Dataset dataset = cube_dataset(6, 24);
-  const ReconstructOptions options = cube_options();
+  const ReconstructOptions options = surveyed_options();
   const Scene scene = survey(dataset, cube_loader(), options, RunContext(1));
   const std::vector<SampleNode> nodes =
       make_samples(dataset, cube_loader(), scene, 0.01, options, RunContext(1));

@@ -30,6 +30,7 @@ struct LightRecord {
   int pass = 0;
   int fitted_views = 0;
   double largest_change = 0;  ///< of any view's light and channel, as a ratio less 1
+  double spread = 0;          ///< of the views' log light: root mean square over views and channels
 };
 
 struct LevelRecord {

@@ -25,7 +25,7 @@ constexpr float kSupport = 2.5f;  ///< steps from its surface within which a vie
 constexpr float kLeastSupportCosine =
     0.5f;                               ///< views that see a surface at a flatter angle support less of it
 constexpr double kFarthestOutline = 4;  ///< pixels
-constexpr std::size_t kBytesPerLeaf = 3 * (Leaf::SIZE * sizeof(float) + 128);
+constexpr std::size_t kBytesPerLeaf = 7 * (Leaf::SIZE * sizeof(float) + 128);  ///< with the sums of a vote
 
 /// A view ready to be asked: per pixel distance along the axis, weight, and the cosine that turns a distance
 /// along the axis into one along the normal.
@@ -108,6 +108,34 @@ struct Vote {
   float distance = 0;  ///< in front of its surface, world units, at most the band
   float weight = 0;    ///< 0: it says nothing
   bool near = false;   ///< its surface is close by
+};
+
+/// What views that see a surface at a place say of it, beside those that say it is free: by how much they
+/// differ.
+struct Spread {
+  openvdb::FloatTree::Ptr weight, first, second, count;
+  explicit Spread(const MaskTree& places) {
+    for (openvdb::FloatTree::Ptr* tree : {&weight, &first, &second, &count}) {
+      *tree = make_tree<openvdb::FloatGrid>();
+      (*tree)->topologyUnion(places);
+    }
+  }
+};
+
+/// Of one leaf.
+struct SpreadSums {
+  float *weight, *first, *second, *count;
+  void add(openvdb::Index n, float w, float distance) const {
+    weight[n] += w;
+    first[n] += w * distance;
+    second[n] += w * distance * distance;
+    count[n] += 1;
+  }
+  /// By how much more the views differ than their variances say, at least 1.
+  float chi2(openvdb::Index n) const {
+    if (count[n] < 2) return 1;
+    return std::max(1.0f, (second[n] - first[n] * first[n] / weight[n]) / (count[n] - 1));
+  }
 };
 
 /// Depth between the four pixels around (u, v), or of the nearest one where they are not on one surface.
@@ -227,25 +255,28 @@ class Fusion {
 
   /// The corners of the lattice near a depth of any view.
   void find_places() {
-    MaskTree places;
+    const MaskTree::Ptr made = make_tree<openvdb::MaskGrid>();
+    MaskTree& places = *made;
     for_each_batch([&](const std::vector<PreparedView>& batch) {
-      std::vector<MaskTree> of_view(batch.size());
+      std::vector<MaskTree::Ptr> of_view(batch.size());
+      for (MaskTree::Ptr& mask : of_view) mask = make_tree<openvdb::MaskGrid>();
       parallel_for(static_cast<std::int64_t>(batch.size()), context_.thread_count(),
                    [&](std::int64_t v, int) {
                      context_.throw_if_cancelled();
-                     mark(batch[v], of_view[v]);
+                     mark(batch[v], *of_view[v]);
                    });
-      for (const MaskTree& mask : of_view) places.topologyUnion(mask);
+      for (const MaskTree::Ptr& mask : of_view) places.topologyUnion(*mask);
     });
     if (places.empty()) throw InvalidInput("no view has depth in the box: there is no surface to make");
     openvdb::tools::dilateActiveValues(
         places, static_cast<int>(std::ceil(options_.band)), openvdb::tools::NN_FACE_EDGE_VERTEX,
         openvdb::tools::IGNORE_TILES);  // others would make tiles of full leaves
     check_size(places);
-    voxels_->distance = std::make_shared<openvdb::FloatTree>(places, static_cast<float>(voxels_->band),
-                                                             openvdb::TopologyCopy());
-    voxels_->weight = std::make_shared<openvdb::FloatTree>(places, 0.0f, openvdb::TopologyCopy());
-    voxels_->views = std::make_shared<openvdb::FloatTree>(places, 0.0f, openvdb::TopologyCopy());
+    voxels_->distance = make_tree<openvdb::FloatGrid>(static_cast<float>(voxels_->band));
+    voxels_->weight = make_tree<openvdb::FloatGrid>();
+    voxels_->views = make_tree<openvdb::FloatGrid>();
+    for (const auto& tree : {voxels_->distance, voxels_->weight, voxels_->views}) tree->topologyUnion(places);
+    spread_.emplace(places);
   }
 
   void mark(const PreparedView& view, MaskTree& places) const {
@@ -273,6 +304,12 @@ class Fusion {
   void gather_votes() {
     using Manager = openvdb::tree::LeafManager<openvdb::FloatTree>;
     const Manager distance(*voxels_->distance), weight(*voxels_->weight), views(*voxels_->views);
+    const Manager spread[4]{Manager(*spread_->weight), Manager(*spread_->first), Manager(*spread_->second),
+                            Manager(*spread_->count)};
+    const auto spread_of = [&](std::int64_t i) {
+      const auto data = [&](int k) { return spread[k].leaf(i).buffer().data(); };
+      return SpreadSums{data(0), data(1), data(2), data(3)};
+    };
     const std::int64_t leaves = static_cast<std::int64_t>(distance.leafCount());
     parallel_for(leaves, context_.thread_count(),
                  [&](std::int64_t i, int) { distance.leaf(i).buffer().fill(0); });
@@ -280,19 +317,23 @@ class Fusion {
     for_each_batch([&](const std::vector<PreparedView>& batch) {
       parallel_for(leaves, context_.thread_count(), [&](std::int64_t i, int) {
         if (i % 64 == 0) context_.throw_if_cancelled();
-        add_votes(batch, vote, distance.leaf(i), weight.leaf(i), views.leaf(i));
+        add_votes(batch, vote, distance.leaf(i), weight.leaf(i), views.leaf(i), spread_of(i));
       });
     });
     parallel_for(leaves, context_.thread_count(), [&](std::int64_t i, int) {
       float* sums = distance.leaf(i).buffer().data();
-      const float* weights = weight.leaf(i).buffer().data();
-      for (std::size_t v = 0; v < Leaf::SIZE; ++v)
+      float* weights = weight.leaf(i).buffer().data();
+      const SpreadSums spread_sums = spread_of(i);
+      for (openvdb::Index v = 0; v < Leaf::SIZE; ++v) {
         sums[v] = weights[v] > 0 ? sums[v] / weights[v] : static_cast<float>(voxels_->band);
+        weights[v] /= spread_sums.chi2(v);
+      }
     });
+    spread_.reset();
   }
 
   void add_votes(const std::vector<PreparedView>& batch, const Voting& vote, Leaf& distance, Leaf& weight,
-                 Leaf& views) const {
+                 Leaf& views, const SpreadSums& spread) const {
     float* distances = distance.buffer().data();
     float* weights = weight.buffer().data();
     float* counts = views.buffer().data();
@@ -304,6 +345,8 @@ class Fusion {
         distances[n] += said.weight * said.distance;
         weights[n] += said.weight;
         counts[n] += said.near;
+        if (said.weight > 0 && said.distance < static_cast<float>(voxels_->band))
+          spread.add(n, said.weight, said.distance);
       }
     }
   }
@@ -313,6 +356,7 @@ class Fusion {
   const FusionOptions& options_;
   RunContext& context_;
   std::unique_ptr<DistanceField::Voxels> voxels_;
+  std::optional<Spread> spread_;
 };
 
 }  // namespace

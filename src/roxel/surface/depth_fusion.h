@@ -51,8 +51,10 @@ class DistanceField {
   /// What the field holds at one corner of the lattice.
   struct Sample {
     float distance = 0;  ///< world units, within the band
-    float weight = 0;    ///< sum of inverse variances, world units to the -2; 0: nobody saw it
-    int views = 0;       ///< that see a surface within 2.5 steps of it; -1: filled in
+    /// Sum of inverse variances, less where views differ by more than these say, world units to the -2; 0:
+    /// nobody saw it.
+    float weight = 0;
+    int views = 0;  ///< that see a surface within 2.5 steps of it; -1: filled in
   };
   /// At the corner nearest to x; none where the field holds nothing.
   std::optional<Sample> at(const Eigen::Vector3d& x) const;

@@ -67,6 +67,15 @@ TEST(DepthFusion, ViewsWeighByInverseVariance) {
   EXPECT_NEAR(sample->weight, 100 + 100.0 / 3, 2);  // the wall's normal is that of the middle pixels
 }
 
+TEST(DepthFusion, ViewsThatDifferAreLessSureThanTheySay) {
+  const auto weight = [](float other) {
+    return fused({wall(2.0f, 0.0025f), wall(other, 0.0025f)}, wall_options()).at({0, 0, 2.0})->weight;
+  };
+  EXPECT_NEAR(weight(2.02f), weight(2.0f), 0.01f * weight(2.0f));  // within their deviations of 0.05
+  // 0.3 apart, deviations of 0.05 and half a step together: chi2 = 0.3^2 / 2 / 0.005.
+  EXPECT_NEAR(weight(2.3f), weight(2.0f) / 9, 0.1f * weight(2.0f) / 9);
+}
+
 TEST(DepthFusion, RefusesVarianceThatIsNoNumber) {
   FusionView broken = wall(2.0f, 0.01f);
   for (float& v : broken.variance.data()) v = std::numeric_limits<float>::quiet_NaN();

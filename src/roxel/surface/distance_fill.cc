@@ -15,7 +15,7 @@ using openvdb::FloatTree;
 using Leaf = FloatTree::LeafNodeType;
 using Manager = openvdb::tree::LeafManager<FloatTree>;
 
-constexpr std::int64_t kGrain = 4096;
+constexpr std::int64_t kFillGrain = 4096;
 constexpr float kRim = 1.5f;  ///< surfaces end within so many steps of a corner that nobody knows
 constexpr int kSmoothRounds = 6;
 const std::array<Coord, 6> kNeighbours{Coord(1, 0, 0),  Coord(-1, 0, 0), Coord(0, 1, 0),
@@ -35,7 +35,8 @@ template <class IsUnknown, class IsGiven>
 Unknowns find_unknowns(const DistanceField::Voxels& voxels, const IsUnknown& is_unknown,
                        const IsGiven& is_given, int threads) {
   Unknowns out;
-  openvdb::Int32Tree number(*voxels.weight, -1, openvdb::TopologyCopy());
+  const openvdb::Int32Tree::Ptr made = make_tree<openvdb::Int32Grid>(-1);
+  openvdb::Int32Tree& number = *made;
   openvdb::tree::ValueAccessor<openvdb::Int32Tree> numbers(number);
   for (auto leaf = voxels.weight->cbeginLeaf(); leaf; ++leaf)
     for (auto it = leaf->cbeginValueOn(); it; ++it)
@@ -47,7 +48,7 @@ Unknowns find_unknowns(const DistanceField::Voxels& voxels, const IsUnknown& is_
   out.given_sum.resize(out.places.size());
   out.given_count.resize(out.places.size());
   parallel_for_blocks(
-      std::ssize(out.places), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+      std::ssize(out.places), kFillGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
         const openvdb::tree::ValueAccessor<const openvdb::Int32Tree> own(number);
         const openvdb::tree::ValueAccessor<const FloatTree> weight(*voxels.weight),
             distance(*voxels.distance);
@@ -66,7 +67,8 @@ Unknowns find_unknowns(const DistanceField::Voxels& voxels, const IsUnknown& is_
 
 /// Adds the surroundings of places where seen surface ends.
 void grow_at_rims(DistanceField::Voxels& voxels, int reach) {
-  openvdb::MaskTree rims;
+  const openvdb::MaskTree::Ptr made = make_tree<openvdb::MaskGrid>();
+  openvdb::MaskTree& rims = *made;
   openvdb::tree::ValueAccessor<openvdb::MaskTree> mark(rims);
   const openvdb::tree::ValueAccessor<const FloatTree> weights(*voxels.weight), distances(*voxels.distance);
   const float near = kRim * static_cast<float>(voxels.voxel_size);
@@ -99,7 +101,7 @@ void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads
   }
   now = measured;
   for (int round = 0; round < kSmoothRounds; ++round) {
-    parallel_for_blocks(std::ssize(now), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    parallel_for_blocks(std::ssize(now), kFillGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
       for (std::int64_t i = begin; i < end; ++i) {
         float sum = certainty[i] * measured[i], weight = certainty[i];
         for (int axis = 0; axis < 3; ++axis) {
@@ -126,7 +128,7 @@ void fill_unseen(DistanceField::Voxels& voxels, double hole_size, int threads) {
   std::vector<std::uint8_t> known(now.size()), next_known(now.size());
   const int rounds = static_cast<int>(std::ceil(2 * hole_size)) + 4;
   for (int round = 0; round < rounds; ++round) {
-    parallel_for_blocks(std::ssize(now), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    parallel_for_blocks(std::ssize(now), kFillGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
       for (std::int64_t i = begin; i < end; ++i) {
         float sum = unseen.given_sum[i];
         int count = unseen.given_count[i];

@@ -5,6 +5,7 @@
 #include <openvdb/openvdb.h>
 
 #include "roxel/surface/depth_fusion.h"
+#include "roxel/volume/vdb_grids.inl"
 
 namespace roxel {
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "roxel/surface/distance_voxels.inl"
 
@@ -12,6 +13,11 @@ namespace {
 
 using Eigen::Vector3d;
 using openvdb::Coord;
+
+constexpr int kRelaxRounds = 4;
+constexpr float kRelaxStep = 0.5f;       ///< of the way to the middle of a point's neighbours
+constexpr float kLeastGradient = 0.25f;  ///< of a distance, where it tells the way to its surface
+constexpr float kFarthestMove = 0.75f;   ///< in lattice steps, a round
 
 struct LatticeMesh {
   std::vector<openvdb::Vec3s> points;  ///< in lattice steps
@@ -34,19 +40,14 @@ void add_quad(const openvdb::Vec4I& q, LatticeMesh& mesh) {
 }
 
 LatticeMesh zero_surface(const openvdb::FloatTree::Ptr& distance) {
-  const openvdb::FloatGrid grid(distance);  // its transform is that of lattice steps
-  openvdb::tools::VolumeToMesh mesher(0.0, 0.0, false);
-  mesher(grid);
+  const openvdb::FloatGrid::Ptr grid = make_grid<openvdb::FloatGrid>();  // of lattice steps
+  grid->setTree(distance);
   LatticeMesh mesh;
-  mesh.points.assign(mesher.pointList().get(), mesher.pointList().get() + mesher.pointListSize());
-  for (std::size_t n = 0; n < mesher.polygonPoolListSize(); ++n) {
-    const openvdb::tools::PolygonPool& pool = mesher.polygonPoolList()[n];
-    for (std::size_t i = 0; i < pool.numQuads(); ++i) add_quad(pool.quad(i), mesh);
-    for (std::size_t i = 0; i < pool.numTriangles(); ++i) {
-      const openvdb::Vec3I& t = pool.triangle(i);
-      mesh.triangles.push_back({t[0], t[1], t[2]});
-    }
-  }
+  std::vector<openvdb::Vec3I> triangles;
+  std::vector<openvdb::Vec4I> quads;
+  openvdb::tools::volumeToMesh(*grid, mesh.points, triangles, quads, 0.0, 0.0, false);
+  for (const openvdb::Vec4I& quad : quads) add_quad(quad, mesh);
+  for (const openvdb::Vec3I& t : triangles) mesh.triangles.push_back({t[0], t[1], t[2]});
   return mesh;
 }
 
@@ -163,17 +164,80 @@ std::int64_t close_holes(const LatticeMesh& mesh, const Mesh& topology, const st
   return closed;
 }
 
+/// A distance between the corners of a lattice, in lattice steps.
+class Interpolated {
+ public:
+  explicit Interpolated(const DistanceField::Voxels& voxels)
+      : distance_(*voxels.distance), inverse_step_(static_cast<float>(1 / voxels.voxel_size)) {}
+
+  struct Value {
+    float distance;
+    openvdb::Vec3s gradient;
+  };
+  /// None where the field does not hold all corners around the point.
+  std::optional<Value> operator()(const openvdb::Vec3s& at) const {
+    const Coord base = Coord::floor(openvdb::Vec3d(at));
+    float c[8];
+    for (int corner = 0; corner < 8; ++corner) {
+      if (!distance_.probeValue(base.offsetBy(corner & 1, corner >> 1 & 1, corner >> 2), c[corner]))
+        return {};
+      c[corner] *= inverse_step_;
+    }
+    const float x = at.x() - static_cast<float>(base.x()), y = at.y() - static_cast<float>(base.y()),
+                z = at.z() - static_cast<float>(base.z());
+    const auto mix = [](float a, float b, float t) { return a + t * (b - a); };
+    const float x00 = mix(c[0], c[1], x), x10 = mix(c[2], c[3], x), x01 = mix(c[4], c[5], x),
+                x11 = mix(c[6], c[7], x);
+    const float y0 = mix(x00, x10, y), y1 = mix(x01, x11, y);
+    const openvdb::Vec3s gradient(mix(mix(c[1] - c[0], c[3] - c[2], y), mix(c[5] - c[4], c[7] - c[6], y), z),
+                                  mix(x10 - x00, x11 - x01, z), y1 - y0);
+    return Value{mix(y0, y1, z), gradient};
+  }
+
+ private:
+  openvdb::tree::ValueAccessor<const openvdb::FloatTree> distance_;
+  float inverse_step_;
+};
+
+/// Moves points along the surface towards the middle of their neighbours, and back onto it: those of the dual
+/// method lie anywhere in their cells, and its triangles are slivers where the surface passes close to a
+/// corner of the lattice. Points at open edges stay.
+void relax(const DistanceField::Voxels& voxels, const Mesh& topology, LatticeMesh& mesh) {
+  std::vector<std::uint8_t> fixed(mesh.points.size());
+  const auto neighbours = face_neighbours(topology);
+  for (std::size_t t = 0; t < neighbours.size(); ++t)
+    for (int k = 0; k < 3; ++k)
+      if (neighbours[t][k] < 0) fixed[mesh.triangles[t][k]] = fixed[mesh.triangles[t][(k + 1) % 3]] = 1;
+  const Interpolated field(voxels);
+  std::vector<openvdb::Vec3s> sum(mesh.points.size());
+  std::vector<int> count(mesh.points.size());
+  for (int round = 0; round < kRelaxRounds; ++round) {
+    std::fill(sum.begin(), sum.end(), openvdb::Vec3s(0, 0, 0));
+    std::fill(count.begin(), count.end(), 0);
+    for (const auto& t : mesh.triangles)
+      for (int k = 0; k < 3; ++k) {
+        sum[t[k]] += mesh.points[t[(k + 1) % 3]] + mesh.points[t[(k + 2) % 3]];
+        count[t[k]] += 2;
+      }
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      if (fixed[i] || count[i] == 0) continue;
+      const openvdb::Vec3s from = mesh.points[i];
+      openvdb::Vec3s to = from + kRelaxStep * (sum[i] / static_cast<float>(count[i]) - from);
+      const auto there = field(to);
+      if (!there || there->gradient.lengthSqr() < kLeastGradient * kLeastGradient) continue;
+      to -= there->distance / there->gradient.lengthSqr() * there->gradient;
+      if ((to - from).lengthSqr() < kFarthestMove * kFarthestMove) mesh.points[i] = to;
+    }
+  }
+}
+
 }  // namespace
 
 Extraction extract_surface(const DistanceField& field, const ExtractionOptions& options) {
   const DistanceField::Voxels& voxels = field.voxels();
-  const LatticeMesh mesh = zero_surface(voxels.distance);
+  LatticeMesh mesh = zero_surface(voxels.distance);
   Surface whole;
   whole.mesh = topology_of(mesh);
-  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-    const openvdb::Vec3s& p = mesh.points[i];
-    whole.mesh.points[i] = voxels.origin + voxels.voxel_size * Vector3d(p.x(), p.y(), p.z());
-  }
   Extraction out;
   const std::vector<Support> support = support_of_triangles(mesh, voxels, options.min_views);
   std::vector<std::uint8_t> keep(support.size());
@@ -182,6 +246,11 @@ Extraction extract_surface(const DistanceField& field, const ExtractionOptions& 
   out.debris = drop_small_parts(mesh, whole.mesh, options.smallest_part, keep);
   out.closed = close_holes(mesh, whole.mesh, support, options.hole_size, keep);
   out.unsupported -= out.closed;
+  relax(voxels, whole.mesh, mesh);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    const openvdb::Vec3s& p = mesh.points[i];
+    whole.mesh.points[i] = voxels.origin + voxels.voxel_size * Vector3d(p.x(), p.y(), p.z());
+  }
   out.surface = kept_triangles(whole, keep);
   return out;
 }

@@ -54,6 +54,23 @@ TEST(SurfaceExtraction, ABallIsClosedAndItsOutsideIsOut) {
   }
 }
 
+TEST(SurfaceExtraction, TrianglesAreRegularAndTheirPointsOnTheSurface) {
+  const Mesh mesh = extracted(ball_with_hole(0), {}).surface.mesh;
+  double square_error = 0, quality = 0, worst = 1;
+  for (const Vector3d& x : mesh.points) square_error += (x.norm() - 1) * (x.norm() - 1);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3d p = mesh.points[b] - mesh.points[a], q = mesh.points[c] - mesh.points[a];
+    // 1 where all sides are alike, 0 for a sliver.
+    const double own =
+        2 * std::sqrt(3.0) * p.cross(q).norm() / (p.squaredNorm() + q.squaredNorm() + (p - q).squaredNorm());
+    quality += own / static_cast<double>(mesh.triangles.size());
+    worst = std::min(worst, own);
+  }
+  EXPECT_LT(std::sqrt(square_error / static_cast<double>(mesh.points.size())), 0.008);  // a tenth of a step
+  EXPECT_GT(quality, 0.88);
+  EXPECT_GT(worst, 0.3);
+}
+
 TEST(SurfaceExtraction, NothingIsInventedWhereNobodyLooked) {
   // From +x alone: half a ball at most, open at its rim.
   std::vector<FusionView> views;

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::int64_t kGrain = 512;
+constexpr std::int64_t kTextureGrain = 512;
 constexpr std::uint8_t kUsable = 128;
 constexpr double kBorder = 1.5;  ///< pixels next to what is not usable may be mixed with it
 constexpr float kTooDark = 0.01f, kTooBright = 0.95f;  ///< light that says nothing of gains
@@ -134,7 +134,7 @@ std::vector<std::vector<FaceView>> face_views(const Mesh& mesh, const MeshRays& 
     context.throw_if_cancelled();
     const TextureView view = checked(load(v));
     const Onlooker onlooker(view, rays, options);
-    parallel_for_blocks(std::ssize(out), kGrain, context.thread_count(),
+    parallel_for_blocks(std::ssize(out), kTextureGrain, context.thread_count(),
                         [&](std::int64_t begin, std::int64_t end, int) {
                           for (std::int64_t f = begin; f < end; ++f)
                             if (auto seen = onlooker.look(mesh, f)) {
@@ -157,21 +157,21 @@ std::vector<Rgb> photograph_colors(const Surface& surface, const MeshRays& rays,
     context.throw_if_cancelled();
     const TextureView view = checked(load(v));
     const Onlooker onlooker(view, rays, options);
-    parallel_for_blocks(
-        std::ssize(sums), kGrain, context.thread_count(), [&](std::int64_t begin, std::int64_t end, int) {
-          for (std::int64_t i = begin; i < end; ++i) {
-            const Vector3d& x = surface.mesh.points[i];
-            const double cosine =
-                surface.normals[i].cast<double>().dot((view.camera.pose.centre - x).normalized());
-            if (!(cosine > options.least_cosine)) continue;
-            const auto seen = onlooker.see(x);
-            if (!seen) continue;
-            const Rgb color = bilinear(view.rgb, seen->x(), seen->y());
-            const auto weight = static_cast<float>(cosine * cosine);
-            for (int c = 0; c < 3; ++c) sums[i][c] += weight * gains[v][c] * color[c];
-            weights[i] += weight;
-          }
-        });
+    parallel_for_blocks(std::ssize(sums), kTextureGrain, context.thread_count(),
+                        [&](std::int64_t begin, std::int64_t end, int) {
+                          for (std::int64_t i = begin; i < end; ++i) {
+                            const Vector3d& x = surface.mesh.points[i];
+                            const double cosine = surface.normals[i].cast<double>().dot(
+                                (view.camera.pose.centre - x).normalized());
+                            if (!(cosine > options.least_cosine)) continue;
+                            const auto seen = onlooker.see(x);
+                            if (!seen) continue;
+                            const Rgb color = bilinear(view.rgb, seen->x(), seen->y());
+                            const auto weight = static_cast<float>(cosine * cosine);
+                            for (int c = 0; c < 3; ++c) sums[i][c] += weight * gains[v][c] * color[c];
+                            weights[i] += weight;
+                          }
+                        });
   }
   for (std::size_t i = 0; i < count; ++i)
     for (int c = 0; c < 3; ++c) sums[i][c] = weights[i] > 0 ? sums[i][c] / weights[i] : fallback[i][c];

@@ -16,7 +16,7 @@ constexpr float kTie = 1e-4f;  ///< cost of a view by its number: equals are dec
 constexpr int kRounds = 24;
 constexpr int kSweeps = 10;
 constexpr float kDamping = 0.5f;
-constexpr std::int64_t kGrain = 1024;
+constexpr std::int64_t kChoiceGrain = 1024;
 
 Rgb display(const Rgb& linear, const Rgb& gain) {
   Rgb out;
@@ -141,7 +141,7 @@ class Labelling {
 
   void pass_messages() {
     auto next = messages_;
-    parallel_for_blocks(std::ssize(choices_), kGrain, threads_,
+    parallel_for_blocks(std::ssize(choices_), kChoiceGrain, threads_,
                         [&](std::int64_t begin, std::int64_t end, int) {
                           for (std::int64_t f = begin; f < end; ++f)
                             for (int k = 0; k < 3; ++k) {
@@ -181,24 +181,25 @@ class Labelling {
 }  // namespace
 
 void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads) {
-  parallel_for_blocks(std::ssize(views), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
-    std::vector<float> details;
-    for (std::int64_t f = begin; f < end; ++f) {
-      if (views[f].size() < 2) continue;
-      details.clear();
-      for (const FaceView& view : views[f]) details.push_back(view.detail);
-      const float usual = median(details) + kPlain;
-      for (FaceView& view : views[f])
-        view.quality *= std::clamp((view.detail + kPlain) / usual, kLeastSharpness, kMostSharpness);
-    }
-  });
+  parallel_for_blocks(
+      std::ssize(views), kChoiceGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+        std::vector<float> details;
+        for (std::int64_t f = begin; f < end; ++f) {
+          if (views[f].size() < 2) continue;
+          details.clear();
+          for (const FaceView& view : views[f]) details.push_back(view.detail);
+          const float usual = median(details) + kPlain;
+          for (FaceView& view : views[f])
+            view.quality *= std::clamp((view.detail + kPlain) / usual, kLeastSharpness, kMostSharpness);
+        }
+      });
 }
 
 std::int64_t drop_transients(const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
                              const ViewChoiceOptions& options, std::vector<std::vector<FaceView>>& views) {
   std::vector<std::int64_t> dropped(views.size());
   parallel_for_blocks(
-      std::ssize(views), kGrain, options.threads, [&](std::int64_t begin, std::int64_t end, int) {
+      std::ssize(views), kChoiceGrain, options.threads, [&](std::int64_t begin, std::int64_t end, int) {
         for (std::int64_t f = begin; f < end; ++f)
           dropped[f] =
               drop_from(gains, canonical.empty() ? nullptr : &canonical[f], options.transient, views[f]);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kReach = 2;          ///< voxels
 constexpr double kNearness = 0.7;  ///< sigma of the weight by distance, voxels
-constexpr std::int64_t kGrain = 1024;
+constexpr std::int64_t kColorGrain = 1024;
 
 class ColorOfPoint {
  public:
@@ -57,9 +57,10 @@ std::vector<std::array<float, 3>> volume_colors(const std::vector<Eigen::Vector3
                                                 int threads) {
   const ColorOfPoint color(volume, colors);
   std::vector<std::array<float, 3>> out(points.size());
-  parallel_for_blocks(std::ssize(points), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
-    for (std::int64_t i = begin; i < end; ++i) out[i] = color(points[i]);
-  });
+  parallel_for_blocks(std::ssize(points), kColorGrain, threads,
+                      [&](std::int64_t begin, std::int64_t end, int) {
+                        for (std::int64_t i = begin; i < end; ++i) out[i] = color(points[i]);
+                      });
   return out;
 }
 

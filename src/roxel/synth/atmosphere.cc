@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "roxel/base/angles.h"
 
 namespace roxel {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kGround = 6360, kDepth = 100;  // radius of the earth, height of the atmosphere, km
 // Per kilometre at sea level and kilometres [Bruneton17].
 const Vector3d kAirScattering(5.802e-3, 13.558e-3, 33.1e-3);

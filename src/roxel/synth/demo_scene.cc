@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/synth/demo_textures.h"
 #include "roxel/synth/noise.h"
 #include "roxel/synth/shapes.h"
@@ -14,14 +14,13 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kColumnCount = 8;
 constexpr float kColumnRing = 0.55f;
 
 const std::array<Vector2f, kColumnCount> kColumnDirections = [] {
   std::array<Vector2f, kColumnCount> directions;
   for (int i = 0; i < kColumnCount; ++i) {
-    const float angle = static_cast<float>(i) * 2 * kPi / kColumnCount;
+    const float angle = static_cast<float>(i) * 2 * kPiFloat / kColumnCount;
     directions[i] = {std::cos(angle), std::sin(angle)};
   }
   return directions;
@@ -56,14 +55,14 @@ float smooth_step(float from, float to, float x) {
 DemoScene::DemoScene(std::uint32_t seed) : seed_(seed) {
   const auto random = [seed](int item, int what) { return lattice_random(item, what, 0, seed ^ 0x7ee5u); };
   for (int i = 0; i < static_cast<int>(trees_.size()); ++i) {
-    const float angle = (i + 0.25f + 0.3f * random(i, 0)) * 2 * kPi / trees_.size();
+    const float angle = (i + 0.25f + 0.3f * random(i, 0)) * 2 * kPiFloat / trees_.size();
     const float radius = 1.06f + 0.04f * random(i, 1);
     const float crown = 0.16f + 0.06f * random(i, 3);
     trees_[i] = {Vector2f(radius * std::cos(angle), radius * std::sin(angle)), 0.34f + 0.16f * random(i, 2),
                  crown, Ellipsoid(crown, crown, 0.9f * crown)};
   }
   for (int i = 0; i < static_cast<int>(boulders_.size()); ++i) {
-    const float angle = (i + 0.5f * random(i, 4)) * 2 * kPi / boulders_.size() + 0.15f;
+    const float angle = (i + 0.5f * random(i, 4)) * 2 * kPiFloat / boulders_.size() + 0.15f;
     const float radius = 1.0f + 0.17f * random(i, 5);
     const float size = 0.05f + 0.05f * random(i, 6);
     boulders_[i] = {

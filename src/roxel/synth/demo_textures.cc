@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <span>
 
+#include "roxel/base/angles.h"
 #include "roxel/color/color_space.h"
+#include "roxel/synth/blend.h"
 #include "roxel/synth/noise.h"
 #include "roxel/synth/texture.h"
 
@@ -15,16 +16,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
 float clamp01(float x) { return std::clamp(x, 0.0f, 1.0f); }
-
-float ramp(float from, float to, float x) {
-  const float t = clamp01((x - from) / (to - from));
-  return t * t * (3 - 2 * t);
-}
-
-Vector3f mix(const Vector3f& a, const Vector3f& b, float share_b) { return a + clamp01(share_b) * (b - a); }
 
 /// One of several paints; t in [0, 1).
 Vector3f pick(std::span<const std::uint32_t> paints, float t) {
@@ -50,7 +42,7 @@ Vector3f mosaic(float s, float t, float joint, std::span<const std::uint32_t> pa
 
 /// Turns around the Z axis, [0, 1), as a whole number of cells.
 float cells_around(const Vector3f& p, int count) {
-  return (std::atan2(p.y(), p.x()) / (2 * kPi) + 0.5f) * static_cast<float>(count);
+  return (std::atan2(p.y(), p.x()) / (2 * kPiFloat) + 0.5f) * static_cast<float>(count);
 }
 
 Vector3f marble(const Vector3f& p, std::uint32_t tint, std::uint32_t seed) {
@@ -125,10 +117,10 @@ Vector3f steps(const Vector3f& p, const Vector3f& normal, int step, std::uint32_
 Vector3f column(const Vector3f& p, int index, std::uint32_t seed) {
   static constexpr std::uint32_t kBands[] = {0xb23a2a, 0x1f5f8b, 0xd39a2c, 0x2f7d5b};
   const Vector3f stone = marble(p, 0xd9c2a0, seed + 30 + index);
-  const float turn = index * 2 * kPi / 8;
+  const float turn = index * 2 * kPiFloat / 8;
   const float x = std::cos(turn) * p.x() + std::sin(turn) * p.y() - 0.55f;
   const float y = std::cos(turn) * p.y() - std::sin(turn) * p.x();
-  const float spiral = 7 * p.z() + std::atan2(y, x) / (2 * kPi);
+  const float spiral = 7 * p.z() + std::atan2(y, x) / (2 * kPiFloat);
   const float band = spiral - std::floor(spiral);
   const float ribbon = ramp(0.28f, 0.31f, band) * ramp(0.62f, 0.59f, band);
   return mix(stone, grained(paint(kBands[index % 4]), p, 34, 0.5f, seed + 31), 0.9f * ribbon);
@@ -150,10 +142,11 @@ Vector3f beam(const Vector3f& p, const Vector3f& normal, int index, std::uint32_
 Vector3f dome(const Vector3f& p, std::uint32_t seed) {
   static constexpr std::uint32_t kGlaze[] = {0x0f6b75, 0x1a8f8a, 0x14506b, 0x39aa9a,
                                              0x0c3f5c, 0xcf9b3a, 0x1c7f9c};
-  const float climb = std::asin(clamp01((p.z() - 1.08f) / 0.5f)) / (0.5f * kPi);
+  const float climb = std::asin(clamp01((p.z() - 1.08f) / 0.5f)) / (0.5f * kPiFloat);
   const float row = climb * 15;
   const int index = static_cast<int>(std::floor(row));
-  const int count = std::max(8, static_cast<int>(std::lround(44 * std::cos(0.5f * kPi * index / 15.0f))));
+  const int count =
+      std::max(8, static_cast<int>(std::lround(44 * std::cos(0.5f * kPiFloat * index / 15.0f))));
   const float around = cells_around(p, count) + 0.5f * (index & 1);
   const float fs = around - std::floor(around) - 0.5f, ft = row - std::floor(row);
   const int tile = static_cast<int>(std::floor(around)) % count;

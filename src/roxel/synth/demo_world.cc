@@ -21,18 +21,18 @@ using Eigen::Vector3f;
 constexpr double kRingRadius = 5.2;
 const Vector3d kTarget(0, 0, 0.36);
 
-void require(const char* field, int value, int low, int high) {
+void require_demo(const char* field, int value, int low, int high) {
   if (value >= low && value <= high) return;
   throw_invalid(std::string("demo world: ") + field, std::to_string(value),
                 std::to_string(low) + " to " + std::to_string(high));
 }
 
 void check(const DemoWorldOptions& options) {
-  require("images", options.images, 2, 999);
-  require("width", options.width, 16, 16384);
-  require("height", options.height, 16, 16384);
-  require("samples_per_axis", options.samples_per_axis, 1, 8);
-  require("points", options.points, 0, 1000000);
+  require_demo("images", options.images, 2, 999);
+  require_demo("width", options.width, 16, 16384);
+  require_demo("height", options.height, 16, 16384);
+  require_demo("samples_per_axis", options.samples_per_axis, 1, 8);
+  require_demo("points", options.points, 0, 1000000);
 }
 
 /// The camera at `centre` that sees the target in the image's middle, up being up.

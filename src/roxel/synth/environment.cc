@@ -4,26 +4,26 @@
 #include <cmath>
 #include <numbers>
 
+#include "roxel/base/angles.h"
+
 namespace roxel {
 namespace {
 
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
 Eigen::Map<const Vector3f> texel(const Image& map, int x, int y) {
   const int column = (x % map.width() + map.width()) % map.width();
   return Eigen::Map<const Vector3f>(map.pixel(column, std::clamp(y, 0, map.height() - 1)));
 }
 
-float solid_angle(float angular_radius) { return 2 * kPi * (1 - std::cos(angular_radius)); }
+float solid_angle(float angular_radius) { return 2 * kPiFloat * (1 - std::cos(angular_radius)); }
 
 }  // namespace
 
 Vector3f map_direction(const Image& map, float u, float v) {
-  const float azimuth = (u / static_cast<float>(map.width()) - 0.5f) * 2 * kPi;
-  const float elevation = (0.5f - v / static_cast<float>(map.height())) * kPi;
+  const float azimuth = (u / static_cast<float>(map.width()) - 0.5f) * 2 * kPiFloat;
+  const float elevation = (0.5f - v / static_cast<float>(map.height())) * kPiFloat;
   return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
           std::sin(elevation)};
 }
@@ -31,8 +31,8 @@ Vector3f map_direction(const Image& map, float u, float v) {
 Vector2f map_position(const Image& map, const Vector3f& direction) {
   const float azimuth = std::atan2(direction.x(), direction.y());
   const float elevation = std::asin(std::clamp(direction.z(), -1.0f, 1.0f));
-  return {(azimuth / (2 * kPi) + 0.5f) * static_cast<float>(map.width()),
-          (0.5f - elevation / kPi) * static_cast<float>(map.height())};
+  return {(azimuth / (2 * kPiFloat) + 0.5f) * static_cast<float>(map.width()),
+          (0.5f - elevation / kPiFloat) * static_cast<float>(map.height())};
 }
 
 Vector3f Sun::radiance() const { return irradiance / solid_angle(angular_radius_rad); }
@@ -71,13 +71,13 @@ Image Environment::map_with_disc() const {
   for (int i = 0; i < kRings; ++i)
     for (int k = 0; k < kSpokes; ++k) {
       const float radius = sun_.angular_radius_rad * std::sqrt((static_cast<float>(i) + 0.5f) / kRings);
-      const float turn = 2 * kPi * static_cast<float>(k) / kSpokes;
+      const float turn = 2 * kPiFloat * static_cast<float>(k) / kSpokes;
       const Vector3f direction = w + std::tan(radius) * (std::cos(turn) * u + std::sin(turn) * v);
       const Vector2f at = map_position(map, direction.normalized());
       const int x = std::min(static_cast<int>(at.x()), kWidth - 1),
                 y = std::min(static_cast<int>(at.y()), kHeight - 1);
-      const float elevation = (0.5f - (static_cast<float>(y) + 0.5f) / kHeight) * kPi;
-      const float pixel = (2 * kPi / kWidth) * (kPi / kHeight) * std::cos(elevation);
+      const float elevation = (0.5f - (static_cast<float>(y) + 0.5f) / kHeight) * kPiFloat;
+      const float pixel = (2 * kPiFloat / kWidth) * (kPiFloat / kHeight) * std::cos(elevation);
       Eigen::Map<Vector3f>(map.pixel(x, y)) += sun_.irradiance / (pixel * kRings * kSpokes);
     }
   return map;

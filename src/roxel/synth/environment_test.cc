@@ -1,9 +1,9 @@
 #include "roxel/synth/environment.h"
+#include "roxel/base/angles.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "roxel/synth/sample_stream.h"
 #include "roxel/synth/sky_sampler.h"
@@ -13,8 +13,6 @@ namespace {
 
 using Eigen::Vector2f;
 using Eigen::Vector3f;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 Environment uniform(float radiance, const Sun& sun = {}) {
   return Environment([=](const Vector3f&) { return Vector3f::Constant(radiance); }, sun);
@@ -37,7 +35,7 @@ TEST(SkyMap, HasNorthInTheMiddleEastToTheRightAndTheZenithOnTop) {
 }
 
 TEST(Environment, OfOneBrightnessGivesPiTimesItOnTheGround) {
-  EXPECT_LT((uniform(2).sky_irradiance() - Vector3f::Constant(2 * kPi)).norm(), 2e-3f);
+  EXPECT_LT((uniform(2).sky_irradiance() - Vector3f::Constant(2 * kPiFloat)).norm(), 2e-3f);
   const Environment sunny = uniform(2, sun_at({3, 0, 4}));
   EXPECT_LT((sunny.total_irradiance() - sunny.sky_irradiance() - 0.8f * sunny.sun().irradiance).norm(),
             1e-5f);
@@ -50,7 +48,8 @@ TEST(Environment, TheDiscInTheMapCarriesTheSunsLight) {
     const Image with = sky.map_with_disc(), &without = sky.map_without_disc();
     Vector3f sum = Vector3f::Zero();
     for (int y = 0; y < 256; ++y) {
-      const float pixel = (2 * kPi / 512) * (kPi / 256) * std::cos((0.5f - (y + 0.5f) / 256) * kPi);
+      const float pixel =
+          (2 * kPiFloat / 512) * (kPiFloat / 256) * std::cos((0.5f - (y + 0.5f) / 256) * kPiFloat);
       for (int x = 0; x < 512; ++x)
         for (int c = 0; c < 3; ++c) sum[c] += pixel * (with.pixel(x, y)[c] - without.pixel(x, y)[c]);
     }
@@ -93,8 +92,8 @@ TEST(SkySampler, ItsDensityIsThatOfItsDirections) {
     ASSERT_NEAR(d.norm(), 1, 1e-5);
     (d.z() > 0 ? upper : lower) += 1 / sampler.density(d) / kCount;
   }
-  EXPECT_NEAR(upper / (2 * kPi), 1, 0.03);
-  EXPECT_NEAR(lower / (2 * kPi), 1, 0.1);  // few directions go there
+  EXPECT_NEAR(upper / (2 * kPiFloat), 1, 0.03);
+  EXPECT_NEAR(lower / (2 * kPiFloat), 1, 0.1);  // few directions go there
 }
 
 TEST(SkySampler, FindsTheLightOfTheMap) {

@@ -6,9 +6,11 @@
 #include <memory>
 #include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/base/parallel.h"
 #include "roxel/sky/sun_position.h"
 #include "roxel/synth/atmosphere.h"
+#include "roxel/synth/blend.h"
 #include "roxel/synth/noise.h"
 
 namespace roxel {
@@ -17,14 +19,8 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kSunOutside = 3.5f;     // irradiance outside the atmosphere
 constexpr float kGroundAlbedo = 0.18f;  // of the land around, as it is seen below the horizon
-
-float ramp(float from, float to, float x) {
-  const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
-  return t * t * (3 - 2 * t);
-}
 
 /// Where a direction meets a layer of cloud, in its thicknesses; the layer sinks with the horizon.
 Vector3f in_layer(const Vector3f& d) {
@@ -56,7 +52,7 @@ Vector3f clear_irradiance(const Atmosphere& air, const Vector3d& to_sun) {
 
 /// [MoonSpencer42]: three times as bright in the zenith as at the horizon; with some unrest.
 Vector3f overcast_radiance(const Vector3f& d, const Vector3f& irradiance, std::uint32_t seed) {
-  const Vector3f zenith = 9 / (7 * kPi) * irradiance;
+  const Vector3f zenith = 9 / (7 * kPiFloat) * irradiance;
   const float unrest = 1 + 0.2f * fractal_noise(0.8f * in_layer(d), 4, seed);
   return unrest * (1 + 2 * std::max(d.z(), 0.0f)) / 3 * zenith;
 }
@@ -77,7 +73,7 @@ Weather weather_of(int occasion, const LightPlan& plan) {
 
 /// A horizontal white sheet comes out at four fifths of display white.
 float exposure_for(const Environment& environment) {
-  return 0.8f * kPi / environment.total_irradiance().mean();
+  return 0.8f * kPiFloat / environment.total_irradiance().mean();
 }
 
 Light outdoor_light(int index, UtcSeconds time, const Weather& weather) {
@@ -111,7 +107,7 @@ Environment daylight(const Vector3f& to_sun, const Weather& weather) {
   sun.direction = to_sun;
   if (!overcast) sun.irradiance = kSunOutside * air.transmittance(sun_d.z()).cast<float>();
 
-  const Vector3f ground = kGroundAlbedo / kPi * (overcast ? grey_light : clear_light);
+  const Vector3f ground = kGroundAlbedo / kPiFloat * (overcast ? grey_light : clear_light);
   const auto radiance = [&](const Vector3f& d) -> Vector3f {
     if (d.z() < 0) return ground;
     if (overcast) return overcast_radiance(d, grey_light, weather.seed);
@@ -120,7 +116,7 @@ Environment daylight(const Vector3f& to_sun, const Weather& weather) {
     // Clouds are lit by all that falls on them, and shine towards us where the sun stands behind them.
     const float glow = 0.55f + 0.9f * std::pow(std::max(d.dot(to_sun), 0.0f), 8.0f);
     const float body = 1 + 0.35f * fractal_noise(3 * in_layer(d), 4, weather.seed + 9);
-    const Vector3f cloud = glow * body / kPi * clear_light;
+    const Vector3f cloud = glow * body / kPiFloat * clear_light;
     return clear + cloud_opacity(d, to_sun, weather) * (cloud - clear);
   };
   return Environment(radiance, sun);
@@ -129,7 +125,7 @@ Environment daylight(const Vector3f& to_sun, const Weather& weather) {
 Environment studio(const Vector3f& to_lamp, float surround) {
   Sun lamp;
   lamp.direction = to_lamp.normalized();
-  lamp.irradiance = kPi * Vector3f(0.52f, 0.50f, 0.47f);
+  lamp.irradiance = kPiFloat * Vector3f(0.52f, 0.50f, 0.47f);
   lamp.angular_radius_rad = 0.12f;
   return Environment(
       [&](const Vector3f& d) {

@@ -3,7 +3,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/base/error.h"
+#include "roxel/synth/blend.h"
 
 namespace roxel {
 namespace {
@@ -11,13 +13,7 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kTurn = 2 * std::numbers::pi_v<float>;
-
-/// Two unit vectors that make a right-handed frame with the unit vector w.
-void frame_about(const Vector3f& w, Vector3f& u, Vector3f& v) {
-  u = (std::abs(w.x()) < 0.7f ? Vector3f::UnitX() : Vector3f::UnitY()).cross(w).normalized();
-  v = w.cross(u);
-}
+constexpr float kTurn = 2 * kPiFloat;
 
 }  // namespace
 

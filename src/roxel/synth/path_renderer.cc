@@ -2,9 +2,10 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/base/error.h"
+#include "roxel/synth/blend.h"
 #include "roxel/synth/light_filter.h"
 #include "roxel/synth/sample_stream.h"
 
@@ -14,15 +15,8 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kPi = std::numbers::pi_v<float>;
-
-void frame_about(const Vector3f& w, Vector3f& u, Vector3f& v) {
-  u = (std::abs(w.x()) < 0.7f ? Vector3f::UnitX() : Vector3f::UnitY()).cross(w).normalized();
-  v = w.cross(u);
-}
-
 Vector2f on_disc(const Vector2f& random) {
-  const float radius = std::sqrt(random.x()), turn = 2 * kPi * random.y();
+  const float radius = std::sqrt(random.x()), turn = 2 * kPiFloat * random.y();
   return {radius * std::cos(turn), radius * std::sin(turn)};
 }
 
@@ -79,7 +73,7 @@ Vector3f PathRenderer::sunlight(const Vector3f& p, const Vector3f& normal, const
   const float facing = normal.dot(to_sun);
   if (facing <= 0 || everything_.occluded(p, to_sun, 0, std::numeric_limits<float>::infinity()))
     return Vector3f::Zero();
-  return (facing / kPi) * sun.irradiance;
+  return (facing / kPiFloat) * sun.irradiance;
 }
 
 // The sky is found in two ways, by directions that favour its bright parts and by diffuse ones; each light
@@ -89,7 +83,8 @@ Vector3f PathRenderer::skylight(const Vector3f& p, const Vector3f& normal, const
   const float facing = normal.dot(direction);
   if (facing <= 0 || everything_.occluded(p, direction, 0, std::numeric_limits<float>::infinity()))
     return Vector3f::Zero();
-  return (facing / kPi) / (sampler_.density(direction) + facing / kPi) * environment_.sky(direction);
+  return (facing / kPiFloat) / (sampler_.density(direction) + facing / kPiFloat) *
+         environment_.sky(direction);
 }
 
 // The same with points of the opening in place of bright directions.
@@ -101,7 +96,8 @@ Vector3f PathRenderer::light_from_above(const Vector3f& p, const Vector3f& norma
   const Vector3f direction = way.normalized();
   const float facing = normal.dot(direction);
   if (facing <= 0 || way.z() <= 0 || everything_.occluded(p, way, 0, 1)) return Vector3f::Zero();
-  return (facing / kPi) / (opening_density(p, direction) + facing / kPi) * environment_.sky(direction);
+  return (facing / kPiFloat) / (opening_density(p, direction) + facing / kPiFloat) *
+         environment_.sky(direction);
 }
 
 /// Probability a steradian that an even point of the opening lies in this direction.
@@ -120,7 +116,7 @@ Vector3f PathRenderer::sky_found(const Vector3f& p, const Vector3f& direction, f
   if (search_ == SkySearch::kByChance) return sky;
   const float density =
       search_ == SkySearch::kOpening ? opening_density(p, direction) : sampler_.density(direction);
-  return (facing / kPi) / (density + facing / kPi) * sky;
+  return (facing / kPiFloat) / (density + facing / kPiFloat) * sky;
 }
 
 // A path goes on in a direction of diffuse reflection; where it leaves the world it has found the sky, and

@@ -1,9 +1,9 @@
 #include "roxel/synth/path_renderer.h"
+#include "roxel/base/angles.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "roxel/synth/camera_paths.h"
 #include "roxel/synth/mesh_builder.h"
@@ -14,8 +14,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 Environment uniform_sky(float radiance) {
   return Environment([=](const Vector3f&) { return Vector3f::Constant(radiance); }, {});
@@ -91,7 +89,7 @@ TEST(PathRenderer, APlaneReflectsTheIrradianceOfAPeakedSky) {
   MeshBuilder(studio.mesh).quad({-50, -50, 0}, {50, -50, 0}, {50, 50, 0}, {-50, 50, 0});
   const Environment sky = peaked_sky();
   const Picture picture = studio.picture(camera_at({0, 0, 5}, {0, 0, 0}), sky, 0.5f);
-  EXPECT_NEAR(mean(picture.rgb) / (0.5 * sky.sky_irradiance().x() / kPi), 1, 0.01);
+  EXPECT_NEAR(mean(picture.rgb) / (0.5 * sky.sky_irradiance().x() / kPiFloat), 1, 0.01);
 }
 
 TEST(PathRenderer, AnOpeningThatIsLookedForGivesTheLightThatChanceFinds) {
@@ -101,7 +99,7 @@ TEST(PathRenderer, AnOpeningThatIsLookedForGivesTheLightThatChanceFinds) {
   // A room without a ceiling.
   build.quad({-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0});
   for (int side = 0; side < 4; ++side) {
-    build.place(placed({0, 0, 0}, side * kPi / 2));
+    build.place(placed({0, 0, 0}, side * kPiFloat / 2));
     build.quad({-2, 2, 0}, {2, 2, 0}, {2, 2, 3}, {-2, 2, 3});
   }
   const PinholeCamera camera = camera_at({0, -1, 1.5}, {0, 0.3, 0}, 8, 8, 2);
@@ -114,7 +112,7 @@ TEST(PathRenderer, AnOpeningThatIsLookedForGivesTheLightThatChanceFinds) {
 Environment only_sun(const Vector3f& direction) {
   Sun sun;
   sun.direction = direction.normalized();
-  sun.irradiance = Vector3f::Constant(kPi);
+  sun.irradiance = Vector3f::Constant(kPiFloat);
   return Environment([](const Vector3f&) { return Vector3f(Vector3f::Zero()); }, sun);
 }
 

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "roxel/base/angles.h"
 
 namespace roxel {
 namespace {
 
 using Eigen::Vector2f;
 using Eigen::Vector3f;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 /// Mean brightness of the map's pixels in a block.
 float brightness(const Image& map, int x0, int y0, int width, int height) {
@@ -22,7 +21,9 @@ float brightness(const Image& map, int x0, int y0, int width, int height) {
 
 }  // namespace
 
-float SkySampler::row_bottom(int row) { return std::sin((0.5f - static_cast<float>(row + 1) / kRows) * kPi); }
+float SkySampler::row_bottom(int row) {
+  return std::sin((0.5f - static_cast<float>(row + 1) / kRows) * kPiFloat);
+}
 
 SkySampler::SkySampler(const Environment& environment) {
   const Image& map = environment.map_without_disc();
@@ -42,7 +43,7 @@ SkySampler::SkySampler(const Environment& environment) {
   }
   for (float& value : density_) value /= static_cast<float>(sum);
   for (float& value : cumulative_) value /= static_cast<float>(sum);
-  peak_ = brightest * 4 * kPi / static_cast<float>(sum);
+  peak_ = brightest * 4 * kPiFloat / static_cast<float>(sum);
 }
 
 Vector3f SkySampler::direction(const Vector2f& random) const {
@@ -52,17 +53,17 @@ Vector3f SkySampler::direction(const Vector2f& random) const {
   const float before = cell > 0 ? cumulative_[cell - 1] : 0.0f, share = cumulative_[cell] - before;
   const float across = share > 0 ? std::clamp((random.x() - before) / share, 0.0f, 1.0f) : 0.5f;
   const int row = cell / kColumns, column = cell % kColumns;
-  const float azimuth = (static_cast<float>(column) + across) * kCellAzimuth - kPi;
+  const float azimuth = (static_cast<float>(column) + across) * kCellAzimuth - kPiFloat;
   const float low = row_bottom(row), up = low + random.y() * (row_bottom(row - 1) - low);
   const float flat = std::sqrt(std::max(0.0f, 1 - up * up));
   return {flat * std::sin(azimuth), flat * std::cos(azimuth), up};
 }
 
 float SkySampler::density(const Vector3f& direction) const {
-  const float azimuth = std::atan2(direction.x(), direction.y()) + kPi;
+  const float azimuth = std::atan2(direction.x(), direction.y()) + kPiFloat;
   const float elevation = std::asin(std::clamp(direction.z(), -1.0f, 1.0f));
   const int column = std::clamp(static_cast<int>(azimuth / kCellAzimuth), 0, kColumns - 1);
-  const int row = std::clamp(static_cast<int>((0.5f - elevation / kPi) * kRows), 0, kRows - 1);
+  const int row = std::clamp(static_cast<int>((0.5f - elevation / kPiFloat) * kRows), 0, kRows - 1);
   return density_[row * kColumns + column];
 }
 

@@ -16,7 +16,7 @@ using Eigen::Vector3f;
 constexpr float kQuarter = 0.5f * std::numbers::pi_v<float>;
 constexpr float kHalfLength = 42, kHalfWidth = 9;
 
-enum Stuff {
+enum StreetStuff {
   kGlass,
   kFrame,
   kTrimLight,
@@ -44,7 +44,7 @@ enum Stuff {
 };
 constexpr int kWallCount = 7;
 
-std::vector<Texture> stuffs(std::uint32_t seed) {
+std::vector<Texture> street_textures(std::uint32_t seed) {
   const auto bricks = [&](std::vector<std::uint32_t> paints, float w, float h, std::uint32_t s) {
     return grained(tiles({std::move(paints), 0xb0a898, w, h, 0.1f * h, 0.5f}, seed + s), 1.6f, 0.35f,
                    seed + s + 1);
@@ -210,7 +210,7 @@ Affine3f street_frame() { return placed(Vector3f::Zero(), -0.19f); }
 void build_street_block(World& world, std::uint32_t seed) {
   const Affine3f frame = street_frame();
   world.outdoors = true;
-  for (const Texture& texture : stuffs(seed)) world.materials.push_back(in_frame(texture, frame));
+  for (const Texture& texture : street_textures(seed)) world.materials.push_back(in_frame(texture, frame));
   MeshBuilder build(world.mesh);
   constexpr float l = kHalfLength, w = kHalfWidth;
   add_row(build, 2 * l, 0, frame * placed({-l, w, 0}), seed);

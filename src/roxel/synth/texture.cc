@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "roxel/color/color_space.h"
+#include "roxel/synth/blend.h"
 #include "roxel/synth/noise.h"
 
 namespace roxel {
@@ -13,15 +14,6 @@ namespace {
 
 using Eigen::Vector2f;
 using Eigen::Vector3f;
-
-Vector3f mix(const Vector3f& a, const Vector3f& b, float share_b) {
-  return a + std::clamp(share_b, 0.0f, 1.0f) * (b - a);
-}
-
-float ramp(float from, float to, float x) {
-  const float t = std::clamp((x - from) / (to - from), 0.0f, 1.0f);
-  return t * t * (3 - 2 * t);
-}
 
 Vector3f reflectance(const Vector3f& color) { return color.cwiseMax(0.0f).cwiseMin(1.0f); }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "roxel/base/angles.h"
 #include "roxel/synth/camera_paths.h"
 #include "roxel/synth/mesh_builder.h"
 #include "roxel/synth/world.h"
@@ -14,8 +15,6 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
-
-constexpr float kTurn = 2 * std::numbers::pi_v<float>;
 
 enum Part { kSkin, kHair, kCap, kScarf, kEye, kIris, kLips };
 
@@ -60,7 +59,7 @@ float face_radius(const Vector3f& d) {
 }
 
 Vector3f unit_direction(float u, float v) {
-  const float polar = 0.5f * kTurn * v, turn = kTurn * u;
+  const float polar = 0.5f * (2 * kPiFloat) * v, turn = (2 * kPiFloat) * u;
   return {std::sin(polar) * std::sin(turn), -std::sin(polar) * std::cos(turn), std::cos(polar)};
 }
 

@@ -10,7 +10,7 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-void add_shots(World& world, const WorldRequest& request) {
+void add_plane_shots(World& world, const WorldRequest& request) {
   constexpr int kRows = 3;
   const int columns = (request.images + kRows - 1) / kRows;
   const Intrinsics intrinsics = simple_intrinsics(request.width, request.height, 1.9);
@@ -34,7 +34,7 @@ World plane_world(const WorldRequest& request) {
                              0.42f, request.seed)};
   MeshBuilder build(world.mesh);
   build.box({-1, -0.03f, -1}, {1, 0.03f, 1});
-  add_shots(world, request);
+  add_plane_shots(world, request);
   give_each_shot_its_occasion(world);
   return world;
 }

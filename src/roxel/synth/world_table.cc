@@ -19,7 +19,7 @@ using Eigen::Vector3f;
 constexpr float kTop = 0.75f;                                // of the table
 constexpr float kHalfX = 2.6f, kHalfY = 2.3f, kWall = 3.4f;  // of the room
 
-enum Stuff {
+enum TableStuff {
   kTableWood,
   kCloth,
   kCup,
@@ -47,7 +47,7 @@ enum Stuff {
   kFabric,
 };
 
-std::vector<Texture> stuffs(std::uint32_t seed) {
+std::vector<Texture> table_textures(std::uint32_t seed) {
   return {
       planks(0x4a2f1c, 0xa9743f, 0.11f, seed),
       tiles({{0xe9dfc9, 0xb5452f, 0xe9dfc9, 0x2d4a7c, 0xd9a441}, 0xf4efe6, 0.035f, 0.035f, 0.004f, 0},
@@ -276,7 +276,7 @@ void add_room(MeshBuilder& build, std::uint32_t seed) {
   build.box({-1.7f, -kHalfY + 0.02f, 0}, {-0.5f, -kHalfY + 0.42f, 0.7f});
 }
 
-void add_shots(World& world, const WorldRequest& request) {
+void add_table_shots(World& world, const WorldRequest& request) {
   const Vector3d target(0, 0, kTop + 0.11);
   const Intrinsics intrinsics = simple_intrinsics(request.width, request.height, 1.25);
   constexpr double kElevations[] = {12, 30, 52};
@@ -300,7 +300,7 @@ World table_world(const WorldRequest& request) {
   world.stages = {{Vector3f(-0.66f, -0.42f, kTop), Vector3f(-0.54f, 0.42f, kTop)},
                   {Vector3f(0.54f, -0.42f, kTop), Vector3f(0.66f, 0.42f, kTop)}};
   world.transient_size = 0.14f;
-  world.materials = stuffs(request.seed);
+  world.materials = table_textures(request.seed);
   MeshBuilder build(world.mesh);
   add_table(build);
   add_cup(build);
@@ -311,7 +311,7 @@ World table_world(const WorldRequest& request) {
   add_candle(build);
   add_wire_cube(build);
   add_room(build, request.seed);
-  add_shots(world, request);
+  add_table_shots(world, request);
   give_each_shot_its_occasion(world);
   return world;
 }

@@ -1,21 +1,19 @@
-// The only file of this module that sees OpenVDB. A leaf of the mask tree is a brick (8^3), so every edit
-// works on whole masks. OpenVDB numbers the voxels of a leaf z fastest, roxel x fastest: masks are
-// transposed on their way in and out, bit by bit, over set bits only.
-#include <openvdb/Types.h>
-#include <openvdb/math/Coord.h>
+// The only file of this module that sees OpenVDB (by vdb_grids.inl). A leaf of the mask tree is a brick
+// (8^3), so every edit works on whole masks. OpenVDB numbers the voxels of a leaf z fastest, roxel x fastest:
+// masks are transposed on their way in and out, bit by bit, over set bits only.
 #include <openvdb/tools/Morphology.h>
-#include <openvdb/tree/Tree.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "roxel/base/error.h"
+#include "roxel/volume/vdb_grids.inl"
 #include "roxel/volume/volume.h"
 
 namespace roxel {
 namespace {
 
-using MaskTree = openvdb::tree::Tree4<openvdb::ValueMask, 5, 4, 3>::Type;
+using openvdb::MaskTree;
 using Leaf = MaskTree::LeafNodeType;
 static_assert(Leaf::DIM == kBrickSide);
 
@@ -58,12 +56,14 @@ BrickMask divided_octant(const BrickMask& parent, int ox, int oy, int oz) {
 }  // namespace
 
 struct Topology::Tree {
-  MaskTree mask;
+  MaskTree::Ptr made = make_tree<openvdb::MaskGrid>();
+  MaskTree& mask = *made;
 };
 
 Topology::Topology(const LatticeFrame& frame) : frame_(frame), tree_(std::make_unique<Tree>()) {}
-Topology::Topology(const Topology& other)
-    : frame_(other.frame_), tree_(std::make_unique<Tree>(Tree{MaskTree(other.tree_->mask)})) {}
+Topology::Topology(const Topology& other) : frame_(other.frame_), tree_(std::make_unique<Tree>()) {
+  tree_->mask.topologyUnion(other.tree_->mask);
+}
 Topology::Topology(Topology&&) noexcept = default;
 Topology& Topology::operator=(const Topology& other) { return *this = Topology(other); }
 Topology& Topology::operator=(Topology&&) noexcept = default;

@@ -1,0 +1,112 @@
+#include "roxel/depth/scaled_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace roxel {
+namespace {
+
+constexpr double kLeastVoxel = 1.5;  ///< pixels: what refinement was measured at on worlds with known depth
+constexpr int kMostScale = 16;
+constexpr int kDepthStride = 8;  ///< pixels between depths whose median is taken
+
+double median(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+int choose_scale(std::vector<double> voxel_pixels) {
+  std::erase_if(voxel_pixels, [](double pixels) { return !(pixels > 0); });
+  const double across = median(voxel_pixels);
+  int scale = 1;
+  while (2 * scale <= kMostScale && across / (2 * scale) >= kLeastVoxel) scale *= 2;
+  return scale;
+}
+
+double voxel_in_pixels(const Image& depth, double focal_px, double voxel_size) {
+  std::vector<double> depths;
+  for (int y = kDepthStride / 2; y < depth.height(); y += kDepthStride)
+    for (int x = kDepthStride / 2; x < depth.width(); x += kDepthStride)
+      if (const float z = *depth.pixel(x, y); z > 0) depths.push_back(z);
+  const double z = median(depths);
+  return z > 0 ? focal_px * voxel_size / z : 0;
+}
+
+PinholeCamera scaled(PinholeCamera camera, int scale) {
+  Intrinsics& k = camera.intrinsics;
+  k.width = std::max(1, k.width / scale);
+  k.height = std::max(1, k.height / scale);
+  for (double* length : {&k.fx, &k.fy, &k.cx, &k.cy}) *length /= scale;
+  return camera;
+}
+
+Photograph scaled(const Photograph& photo, int scale) {
+  if (scale == 1) return photo;
+  const int width = std::max(1, photo.rgb.width() / scale), height = std::max(1, photo.rgb.height() / scale);
+  const int channels = photo.rgb.channels();
+  Photograph out;
+  out.rgb = Image(width, height, channels);
+  if (!photo.valid.empty()) out.valid = Mask(width, height, 255);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      float* const mean = out.rgb.pixel(x, y);
+      int count = 0;
+      for (int v = y * scale; v < std::min((y + 1) * scale, photo.rgb.height()); ++v)
+        for (int u = x * scale; u < std::min((x + 1) * scale, photo.rgb.width()); ++u, ++count) {
+          for (int c = 0; c < channels; ++c) mean[c] += photo.rgb.pixel(u, v)[c];
+          if (!photo.valid.empty() && !photo.valid.at(u, v)) out.valid.at(x, y) = 0;
+        }
+      for (int c = 0; c < channels; ++c) mean[c] /= static_cast<float>(count);
+    }
+  return out;
+}
+
+std::vector<std::int64_t> surest_pixels(const Image& depth, const Image& variance, int scale) {
+  const int width = std::max(1, depth.width() / scale), height = std::max(1, depth.height() / scale);
+  std::vector<std::int64_t> surest;
+  surest.reserve(static_cast<std::size_t>(width) * height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      std::int64_t best = -1;
+      float least = std::numeric_limits<float>::infinity();
+      for (int v = y * scale; v < std::min((y + 1) * scale, depth.height()); ++v)
+        for (int u = x * scale; u < std::min((x + 1) * scale, depth.width()); ++u) {
+          if (!(*depth.pixel(u, v) > 0) || !(*variance.pixel(u, v) < least)) continue;
+          least = *variance.pixel(u, v);
+          best = static_cast<std::int64_t>(v) * depth.width() + u;
+        }
+      surest.push_back(best);
+    }
+  return surest;
+}
+
+PlaneOfPixel plane_of_pixel(const PlaneMap& planes, int scale, int x, int y, double depth) {
+  const double u = (x + 0.5) / scale, v = (y + 0.5) / scale;
+  PlaneOfPixel best;
+  double least = std::numeric_limits<double>::infinity();
+  const int left = scale == 1 ? x : static_cast<int>(std::floor(u - 0.5));
+  const int top = scale == 1 ? y : static_cast<int>(std::floor(v - 0.5));
+  const int more = scale == 1 ? 0 : 1;
+  for (int row = std::clamp(top, 0, planes.height - 1); row <= std::min(top + more, planes.height - 1); ++row)
+    for (int column = std::clamp(left, 0, planes.width - 1);
+         column <= std::min(left + more, planes.width - 1); ++column) {
+      const PixelPlane& from = planes.at(column, row);
+      if (from.empty()) continue;
+      const double w = from.w + from.wu * (u - (column + 0.5)) + from.wv * (v - (row + 0.5));
+      const double off = w > 0 ? std::abs(1 / w - depth) : std::numeric_limits<double>::infinity();
+      if (!(off < least)) continue;
+      least = off;
+      best = {
+          {static_cast<float>(w), from.wu / static_cast<float>(scale), from.wv / static_cast<float>(scale)},
+          column,
+          row};
+    }
+  return best;
+}
+
+}  // namespace roxel

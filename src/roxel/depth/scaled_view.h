@@ -1,0 +1,37 @@
+#pragma once
+/// Views at a whole fraction of their size: refinement need not look closer than the volume is fine
+/// (docs/depth.md).
+
+#include "roxel/dataset/dataset.h"
+#include "roxel/depth/depth_layers.h"
+#include "roxel/depth/pixel_plane.h"
+
+namespace roxel {
+
+/// The largest power of two by which views may be made smaller so that the median voxel still is 1.5 pixels
+/// across; at most 16. `voxel_pixels`: pixels that a voxel is across, of each view.
+int choose_scale(std::vector<double> voxel_pixels);
+
+/// Pixels that a voxel is across at the median of the depths; 0 without depth.
+double voxel_in_pixels(const Image& depth, double focal_px, double voxel_size);
+
+/// A camera whose pixels are scale x scale of the other's; rows and columns left over are cut off.
+PinholeCamera scaled(PinholeCamera camera, int scale);
+
+/// Means over squares of pixels, valid where all of them are; the mask of the object is left out. At scale 1
+/// the photograph as it is.
+Photograph scaled(const Photograph& photo, int scale);
+
+/// What a pixel of the smaller view takes from the larger one's depth: the surest pixel of its square, -1
+/// where none has depth (> 0). Returns indices into the larger image, row by row.
+std::vector<std::int64_t> surest_pixels(const Image& depth, const Image& variance, int scale);
+
+/// The smaller view's plane for pixel (x, y) of the larger one: of the four around it, the one whose depth
+/// there is closest to `depth`. Slopes are a pixel of the larger view; (column, row): whose it is.
+struct PlaneOfPixel {
+  PixelPlane plane;  ///< empty where none of the four has any
+  int column = 0, row = 0;
+};
+PlaneOfPixel plane_of_pixel(const PlaneMap& planes, int scale, int x, int y, double depth);
+
+}  // namespace roxel

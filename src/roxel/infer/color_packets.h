@@ -1,0 +1,69 @@
+#pragma once
+/// The colour march, eight samples at a time: gives each sample to the voxels along its ray.
+
+#include <vector>
+
+#include "roxel/infer/packet_levels.h"
+#include "roxel/infer/passes.h"
+
+namespace roxel {
+
+/// What eight samples give, and how much of each ray gets as far.
+struct alignas(64) ColorLanes {
+  // Of a sample, in the order of VoxelScratch: mean and second moments xx .. xz; then yz and 1.
+  float low[kLanes][8] = {};
+  float high[kLanes][4] = {};
+  float weight[kLanes] = {};  ///< what a whole sample counts
+  float transmittance[kLanes] = {};
+
+  void set(int lane, const RegionStats& sample, float weight, float transmittance);
+};
+
+class ColorPackets {
+ public:
+  ColorPackets(const LatticeStack& stack, const MarchOptions& options, bool everywhere, NodeScratch& scratch)
+      : options_(options),
+        everywhere_(everywhere),
+        spent_(options.rule == UpdateRule::kRoxels ? kSpentRoxels : kSpent),
+        scratch_(scratch),
+        walk_(stack) {}
+
+  /// Adds what the tile's samples give to the scratch's voxels.
+  void tile(const ViewInSight& in_sight, const Tile& tile);
+
+  PassCounts counts;
+
+ private:
+  /// Transmittance below which what lies behind is not coloured. The roxels rule gives hidden voxels opacity
+  /// as well, so that their colours count for more.
+  static constexpr float kSpent = 1e-3f, kSpentRoxels = 1e-5f;
+
+  struct Sample {
+    Region region;
+    float transmittance;  ///< as far as its stretch, then behind it
+  };
+
+  template <class March>
+  friend void march_tile(March& march, const ViewInSight& in_sight, const Tile& tile);
+  const std::vector<Sample>& samples() const { return samples_; }
+  void add(const SampleView& view, const Region& region, int parent);
+  void begin(int lane, const Ray& ray, Stretch range, const Stretch* sight) {
+    walk_.begin(lane, ray, range, sight);
+  }
+  void march(const SampleView& view, const SamplePacket& packet);
+  bool divides(const SampleView& view, std::size_t sample, bool last) const;
+  void divided(std::size_t, std::size_t, std::size_t) {}
+  void level_done(std::size_t) {}
+  bool goes_on(float transmittance) const { return everywhere_ || transmittance >= spent_; }
+  float sample_weight(const SampleView& view, const Region& region, const RegionStats& sample) const;
+
+  const MarchOptions& options_;
+  bool everywhere_;
+  float spent_;
+  NodeScratch& scratch_;
+  PacketWalk walk_;
+  StepRows steps_;
+  std::vector<Sample> samples_;
+};
+
+}  // namespace roxel
