@@ -61,15 +61,15 @@ class Resume(Case):
     def test_killed_at_twenty_random_moments_it_ends_as_if_nothing_had_happened(self):
         out = self.folder / "killed"
         chance = random.Random(1)
-        start = time.monotonic()
-        self.succeed("reconstruct", self.data, "-o", self.folder / "timed", *OFTEN)
-        whole = time.monotonic() - start
         went_on = 0
         for _ in range(20):
             went_on += (out / "checkpoint/latest.roxel").exists()
             job = subprocess.Popen([cli_test.ROXEL, "reconstruct", str(self.data), "-o", str(out), *OFTEN, "--resume"],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-            time.sleep(whole * chance.uniform(0.1, 0.7))
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            # Counted in what it says: how long a pass takes depends on what else the machine does.
+            for _ in range(chance.randrange(12)):
+                job.stderr.readline()
+            time.sleep(chance.uniform(0, 0.1))
             job.kill()
             said = job.communicate(timeout=60)[1]
             self.assertIn(job.returncode, (0, -signal.SIGKILL), said)

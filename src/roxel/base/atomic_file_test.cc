@@ -1,7 +1,6 @@
 #include "roxel/base/atomic_file.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <iterator>
@@ -10,6 +9,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/full_disc_fixture.h"
+#include "roxel/base/temp_folder.h"
 
 namespace roxel {
 namespace {
@@ -23,13 +23,6 @@ std::string content(const fs::path& file) {
 
 class AtomicFile : public testing::Test {
  protected:
-  void SetUp() override {
-    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    folder_ = fs::path(testing::TempDir()) / ("roxel_" + name + std::to_string(getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   /// Names of all files in the folder: what is left over would show here.
   std::vector<std::string> names() const {
     std::vector<std::string> all;
@@ -37,7 +30,8 @@ class AtomicFile : public testing::Test {
     return all;
   }
 
-  fs::path folder_;
+  const TempFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 TEST_F(AtomicFile, WritesAndReplaces) {

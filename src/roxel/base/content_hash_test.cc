@@ -1,12 +1,12 @@
 #include "roxel/base/content_hash.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <rapidcheck/gtest.h>
 #include <fstream>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 
 namespace roxel {
 namespace {
@@ -33,17 +33,17 @@ RC_GTEST_PROP(ContentHash, SeesOneChangedByte, (std::string text, char other)) {
 }
 
 TEST(HashFile, HashesTheContentOfLongFiles) {
-  const auto file = std::filesystem::path(testing::TempDir()) / ("roxel_hash_" + std::to_string(getpid()));
+  const TempFolder folder;
+  const auto file = folder / "long";
   std::string content;
   for (int i = 0; i < 200000; ++i) content += static_cast<char>(i * 31 / 7);
   std::ofstream(file, std::ios::binary) << content;
   EXPECT_EQ(hash_file(file), ContentHash().update(content).hex());
-  std::filesystem::remove(file);
 }
 
 TEST(HashFile, ReportsWhatCannotBeRead) {
   EXPECT_THROW(hash_file("/nonexistent/file"), IoError);
-  EXPECT_THROW(hash_file(testing::TempDir()), IoError);
+  EXPECT_THROW(hash_file(TempFolder().path()), IoError);
 }
 
 }  // namespace

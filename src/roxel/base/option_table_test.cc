@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <rapidcheck/gtest.h>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 
 namespace roxel {
 namespace {
@@ -98,13 +98,6 @@ std::string rejection(Action action) {
     return error.what();
   }
   return "(accepted)";
-}
-
-std::filesystem::path write_temporary(const std::string& text) {
-  const auto file =
-      std::filesystem::path(testing::TempDir()) / ("roxel_options_" + std::to_string(getpid()) + ".json");
-  std::ofstream(file) << text;
-  return file;
 }
 
 struct Accepted {
@@ -274,7 +267,9 @@ TEST(OptionTable, RejectsJsonAndLeavesTheOptionsAlone) {
 
 TEST(OptionTable, ReadsJsonFiles) {
   Options options;
-  const auto file = write_temporary(R"({"levels": 5})");
+  const TempFolder folder;
+  const auto file = folder / "options.json";
+  std::ofstream(file) << R"({"levels": 5})";
   kTable.apply_json_file(options, file);
   EXPECT_EQ(options.levels, 5);
   const std::vector<std::pair<std::string, std::string>> bad = {
@@ -286,9 +281,9 @@ TEST(OptionTable, ReadsJsonFiles) {
   };
   for (const auto& [text, message] : bad) {
     SCOPED_TRACE(text);
-    const auto path = write_temporary(text);
-    EXPECT_THAT(rejection([&] { kTable.apply_json_file(options, path); }),
-                AllOf(HasSubstr(path.string()), HasSubstr(message)));
+    std::ofstream(file) << text;
+    EXPECT_THAT(rejection([&] { kTable.apply_json_file(options, file); }),
+                AllOf(HasSubstr(file.string()), HasSubstr(message)));
   }
   std::filesystem::remove(file);
   EXPECT_THAT(rejection([&] { kTable.apply_json_file(options, file); }), HasSubstr("no such file"));

@@ -79,7 +79,7 @@ class CheckpointFile : public ::testing::Test {
     io.put(static_cast<char>(byte ^ 0x10));
   }
 
-  fixture::TempFolder folder_;
+  TempFolder folder_;
   fs::path run_ = folder_.path() / "run";
 };
 

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 #include "roxel/io/dataset_reader.h"
 #include "roxel/io/image_file.h"
 
@@ -16,9 +17,8 @@ namespace fs = std::filesystem;
 
 class ColmapDense : public ::testing::Test {
  protected:
-  void SetUp() override { fs::remove_all(folder_); }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path folder_ = fs::path(::testing::TempDir()) / "roxel_colmap_dense";
+  const TempFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 Image ramp(int width, int height, int channels) {
@@ -56,7 +56,6 @@ TEST_F(ColmapDense, AMapIsATextualSizeThenPlanesOfRows) {
 }
 
 TEST_F(ColmapDense, BrokenMapsAreNamed) {
-  fs::create_directories(folder_);
   const fs::path file = folder_ / "map.bin";
   EXPECT_THROW(read_colmap_map(file), InvalidInput);
   for (const std::string& text :

@@ -3,7 +3,6 @@
 /// code that shares nothing with the readers.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <Eigen/Dense>
 #include <cstdint>
@@ -14,32 +13,13 @@
 #include <string>
 #include <vector>
 
+#include "roxel/base/temp_folder.h"
 #include "roxel/image/image.h"
 #include "roxel/io/image_file.h"
 
 namespace roxel::fixture {
 
 namespace fs = std::filesystem;
-
-/// A fresh folder, removed with everything in it.
-class TempFolder {
- public:
-  TempFolder() {
-    static int count = 0;
-    path_ = fs::temp_directory_path() / ("roxel_" + std::to_string(getpid()) + "_" + std::to_string(count++));
-    fs::create_directories(path_);
-  }
-  ~TempFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 inline void write_file(const fs::path& file, const std::string& content) {
   fs::create_directories(file.parent_path());

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 
 namespace roxel {
 namespace {
@@ -17,8 +18,6 @@ using testing::HasSubstr;
 
 class DepthFileTest : public testing::Test {
  protected:
-  ~DepthFileTest() override { fs::remove_all(run_); }
-
   static std::string refusal(const fs::path& path) {
     try {
       read_depth(path);
@@ -28,9 +27,8 @@ class DepthFileTest : public testing::Test {
     }
   }
 
-  const fs::path run_ =
-      fs::path(testing::TempDir()) /
-      ("roxel_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+  const TempFolder temporary_;
+  const fs::path run_ = temporary_.path();
 };
 
 Image noise(int width, int height, unsigned seed) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "roxel/base/temp_folder.h"
 #include "roxel/io/image_file.h"
 
 namespace roxel {
@@ -19,7 +20,8 @@ Image ramp(int channels) {
 }
 
 Image read_back(const std::string& bytes, const std::string& name) {
-  const std::string path = (std::filesystem::path(testing::TempDir()) / name).string();
+  const TempFolder folder;
+  const std::string path = (folder / name).string();
   std::ofstream(path, std::ios::binary) << bytes;
   return read_image(path, Response{ResponseCurve::kLinear}).rgb;
 }

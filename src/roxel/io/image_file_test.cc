@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 #include "roxel/base/test_data.h"
 
 namespace roxel {
@@ -27,18 +28,9 @@ using ::testing::ThrowsMessage;
 /// A folder of its own for every test.
 class ImageFileTest : public ::testing::Test {
  protected:
-  ImageFileTest() {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("roxel_") + info->test_suite_name() + "_" + info->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~ImageFileTest() override { fs::remove_all(folder_); }
-
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
-  fs::path folder_;
+  const TempFolder folder_;
 };
 using ReadImage = ImageFileTest;
 using ReadMask = ImageFileTest;
@@ -355,7 +347,7 @@ TEST_F(WritePng, ReplacesWholeFilesAndLeavesNothingElse) {
   write_png(path("a.png"), Mask(4, 4, 0));
   write_png(path("a.png"), Mask(2, 2, 255));
   EXPECT_EQ(image_size(path("a.png")).width, 2);
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 1);
 }
 
 TEST_F(WritePng, SamePixelsGiveTheSameBytes) {

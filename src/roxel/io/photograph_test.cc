@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 #include "roxel/base/test_data.h"
 #include "roxel/image/undistort.h"
 #include "roxel/io/image_file.h"
@@ -40,11 +41,6 @@ Image position_image() {
 class LoadPhotograph : public ::testing::Test {
  protected:
   LoadPhotograph() {
-    folder_ =
-        fs::path(::testing::TempDir()) /
-        (std::string("roxel_photograph_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     view_.name = "a";
     view_.image_path = path("a.png");
     view_.source = "images.txt:5";
@@ -52,7 +48,6 @@ class LoadPhotograph : public ::testing::Test {
     view_.camera.intrinsics = view_.lens.intrinsics;
     write_png(view_.image_path, position_image(), Response{ResponseCurve::kLinear});
   }
-  ~LoadPhotograph() override { fs::remove_all(folder_); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
   void bend(double k1) {
@@ -71,7 +66,7 @@ class LoadPhotograph : public ::testing::Test {
     return make_photograph_loader({Response{ResponseCurve::kLinear}, masks})(view_);
   }
 
-  fs::path folder_;
+  const TempFolder folder_;
   View view_;
 };
 

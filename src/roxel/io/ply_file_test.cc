@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 #include "roxel/base/test_data.h"
 
 namespace roxel {
@@ -15,15 +16,15 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-fs::path written(const std::string& content) {
-  const fs::path path = fs::path(testing::TempDir()) / "ply_file_test.ply";
-  std::ofstream(path, std::ios::binary) << content;
-  return path;
+Mesh read(const std::string& content) {
+  const TempFolder folder;
+  std::ofstream(folder / "test.ply", std::ios::binary) << content;
+  return read_ply(folder / "test.ply");
 }
 
 std::string message_of(const std::string& content) {
   try {
-    read_ply(written(content));
+    read(content);
   } catch (const InvalidInput& error) {
     return error.what();
   }
@@ -37,7 +38,7 @@ const std::string kSquare =
     "0 0 0 9\n1 0 0 9\n1 1 0 9\n0 1 0.5 9\n4 0 1 2 3\n";
 
 TEST(PlyFile, PolygonsBecomeFansOfTriangles) {
-  const Mesh mesh = read_ply(written(kSquare));
+  const Mesh mesh = read(kSquare);
   ASSERT_EQ(mesh.points.size(), 4);
   EXPECT_EQ(mesh.points[3], Eigen::Vector3d(0, 1, 0.5));
   using Triangle = std::array<std::uint32_t, 3>;
@@ -69,7 +70,7 @@ std::string binary_triangle(bool big) {
 
 TEST(PlyFile, BinaryOfEitherByteOrderIsRead) {
   for (const bool big : {false, true}) {
-    const Mesh mesh = read_ply(written(binary_triangle(big)));
+    const Mesh mesh = read(binary_triangle(big));
     ASSERT_EQ(mesh.points.size(), 3);
     EXPECT_EQ(mesh.points[1], Eigen::Vector3d(1.5, 3, -3));
     ASSERT_EQ(mesh.triangles.size(), 1);
@@ -78,22 +79,22 @@ TEST(PlyFile, BinaryOfEitherByteOrderIsRead) {
 }
 
 TEST(PlyFile, WithoutFacesItIsAPointSet) {
-  const Mesh mesh = read_ply(written(std::string("ply\nformat ascii 1.0\nelement vertex 2\n") + kVertex +
-                                     "end_header\n1 2 3\n4 5 6\n"));
+  const Mesh mesh =
+      read(std::string("ply\nformat ascii 1.0\nelement vertex 2\n") + kVertex + "end_header\n1 2 3\n4 5 6\n");
   EXPECT_TRUE(mesh.is_point_set());
   EXPECT_EQ(mesh.points.size(), 2);
 }
 
 TEST(PlyFile, ElementsWithoutPropertiesTakeNoTime) {
   const Mesh mesh =
-      read_ply(written(std::string("ply\nformat ascii 1.0\nelement nothing 4000000000\nelement vertex 1\n") +
-                       kVertex + "end_header\n1 2 3\n"));
+      read(std::string("ply\nformat ascii 1.0\nelement nothing 4000000000\nelement vertex 1\n") + kVertex +
+           "end_header\n1 2 3\n");
   EXPECT_EQ(mesh.points.size(), 1);
 }
 
 TEST(PlyFile, ErrorsSayWhereAndWhat) {
   const std::string head = "ply\nformat ascii 1.0\nelement vertex 1\n";
-  EXPECT_THAT(message_of(""), HasSubstr("ply_file_test.ply"));
+  EXPECT_THAT(message_of(""), HasSubstr("test.ply"));
   EXPECT_THAT(message_of("hello\nworld\n"), HasSubstr("expected a PLY file"));
   EXPECT_THAT(message_of("ply\nformat xml 1.0\n"), HasSubstr(":2: found 'xml', expected ascii"));
   EXPECT_THAT(message_of(head + "property float16 x\n"), HasSubstr(":4: found 'float16'"));
@@ -113,7 +114,7 @@ TEST(PlyFile, ErrorsSayWhereAndWhat) {
   EXPECT_THAT(message_of("ply\nformat ascii 1.0\nelement vertex 4000000000\n" + std::string(kVertex) +
                          "end_header\n1 2 3\n"),
               HasSubstr("6 bytes (cut off?), expected 4000000000 of element vertex"));
-  EXPECT_THROW(read_ply(fs::path(testing::TempDir()) / "missing.ply"), InvalidInput);
+  EXPECT_THROW(read_ply(TempFolder() / "missing.ply"), InvalidInput);
 }
 
 TEST(PlyFile, ReadsTheTruthOfTheHead) {

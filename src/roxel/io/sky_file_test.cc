@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 #include "roxel/io/image_file.h"
 #include "roxel/io/sky_truth.h"
 #include "roxel/sky/sky_fixture.h"
@@ -20,12 +21,6 @@ using ::testing::HasSubstr;
 
 class SkyFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    run_ = fs::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    fs::remove_all(run_);
-  }
-  void TearDown() override { fs::remove_all(run_); }
-
   NodeSky sky() const {
     NodeSky s = clear_sky(200, 33.3);
     s.name = "n04";
@@ -43,7 +38,8 @@ class SkyFile : public ::testing::Test {
     return s;
   }
 
-  fs::path run_;
+  const TempFolder temporary_;
+  const fs::path run_ = temporary_.path();
 };
 
 TEST_F(SkyFile, ReadsWhatItWroteExactly) {

@@ -9,6 +9,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/full_disc_fixture.h"
+#include "roxel/base/temp_folder.h"
 #include "roxel/io/image_file.h"
 #include "roxel/io/ply_file.h"
 #include "roxel/io/surface_ply.h"
@@ -18,15 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-
-/// A folder of its own for each test.
-fs::path folder() {
-  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  const fs::path path = fs::path(testing::TempDir()) / "textured_file_test" / info->name();
-  fs::remove_all(path);
-  fs::create_directories(path);
-  return path;
-}
 
 /// A square of two triangles that lie in two charts: four points, six texture coordinates.
 TexturedSurface square(const Eigen::Vector3d& corner = Eigen::Vector3d::Zero()) {
@@ -67,7 +59,8 @@ tinygltf::Model read_glb(const fs::path& path) {
 }
 
 TEST(TexturedFile, GlbHoldsTheSurfaceAndItsPicture) {
-  const fs::path path = folder() / "mesh.glb";
+  const TempFolder folder;
+  const fs::path path = folder / "mesh.glb";
   write_glb(path, square(), TextureFormat::kPng);
   const tinygltf::Model model = read_glb(path);
   ASSERT_EQ(model.meshes.size(), 1u);
@@ -96,7 +89,8 @@ TEST(TexturedFile, GlbHoldsTheSurfaceAndItsPicture) {
 }
 
 TEST(TexturedFile, GlbFarFromTheOriginKeepsItsShape) {
-  const fs::path path = folder() / "mesh.glb";
+  const TempFolder folder;
+  const fs::path path = folder / "mesh.glb";
   const Eigen::Vector3d corner(4.5e6, -5.1e6, 100);
   write_glb(path, square(corner), TextureFormat::kJpeg);
   const tinygltf::Model model = read_glb(path);
@@ -109,7 +103,8 @@ TEST(TexturedFile, GlbFarFromTheOriginKeepsItsShape) {
 }
 
 TEST(TexturedFile, ObjNamesItsMaterialAndCountsFromOne) {
-  const fs::path path = folder() / "mesh.obj";
+  const TempFolder folder;
+  const fs::path path = folder / "mesh.obj";
   write_obj(path, square(), TextureFormat::kPng);
   const std::string text = content(path);
   EXPECT_THAT(text, HasSubstr("mtllib mesh.mtl\nusemtl photographs\nv 0 0 0.25\n"));
@@ -120,7 +115,8 @@ TEST(TexturedFile, ObjNamesItsMaterialAndCountsFromOne) {
 }
 
 TEST(TexturedFile, PlyKeepsPlacesAndColours) {
-  const fs::path path = folder() / "mesh.ply";
+  const TempFolder folder;
+  const fs::path path = folder / "mesh.ply";
   const Surface surface = square().surface;
   write_surface_ply(path, surface);
   const Mesh mesh = read_ply(path);
@@ -136,7 +132,8 @@ TEST(TexturedFile, PlyKeepsPlacesAndColours) {
 }
 
 TEST(TexturedFile, PlyFarFromTheOriginIsInDoubles) {
-  const fs::path path = folder() / "mesh.ply";
+  const TempFolder folder;
+  const fs::path path = folder / "mesh.ply";
   const Surface far = square({4.5e6, -5.1e6, 100}).surface;
   EXPECT_TRUE(floats_are_too_coarse(far.mesh));
   write_surface_ply(path, far);
@@ -145,7 +142,8 @@ TEST(TexturedFile, PlyFarFromTheOriginIsInDoubles) {
 }
 
 TEST(TexturedFile, AFullDiscLeavesOlderFilesAsTheyWere) {
-  const fs::path here = folder();
+  const TempFolder folder;
+  const fs::path here = folder.path();
   const TexturedSurface textured = square();
   for (const char* name : {"mesh.ply", "mesh.glb", "mesh.obj"}) std::ofstream(here / name) << "older";
   {

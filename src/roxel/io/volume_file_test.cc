@@ -10,6 +10,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/full_disc_fixture.h"
+#include "roxel/base/temp_folder.h"
 #include "roxel/volume/vdb_grids.inl"
 
 namespace roxel {
@@ -20,9 +21,6 @@ using testing::HasSubstr;
 
 class VolumeFileTest : public testing::Test {
  protected:
-  VolumeFileTest() { fs::create_directories(folder_); }
-  ~VolumeFileTest() override { fs::remove_all(folder_); }
-
   // What read_volume says about a file; empty when it reads it.
   static std::string refusal(const fs::path& path) {
     try {
@@ -33,9 +31,8 @@ class VolumeFileTest : public testing::Test {
     }
   }
 
-  const fs::path folder_ =
-      fs::path(testing::TempDir()) /
-      ("roxel_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+  const TempFolder temporary_;
+  const fs::path folder_ = temporary_.path();
   const fs::path path_ = folder_ / "volume.vdb";
 };
 

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <string>
 
+#include "roxel/base/temp_folder.h"
+
 namespace roxel {
 namespace {
 
@@ -19,7 +21,8 @@ TEST(VoxelsPly, HoldsTheOpaqueVoxelsOfTheBoxAsPoints) {
   volume.confidence = {0.8f, 0.8f, 0.4f, 0.8f};
   volume.color_mean[0] = {1, 0, 2};         // brighter than white is clipped
   volume.color_mean[2] = {0.2140f, 0, -1};  // sRGB 0.5; below black is clipped
-  const auto path = std::filesystem::path(testing::TempDir()) / "roxel_voxels.ply";
+  const TempFolder folder;
+  const auto path = folder / "voxels.ply";
   EXPECT_EQ(write_voxels_ply(path, volume, ColorTransform(ColorSpace::kRgb), 0.3f, 0.5f), 1);
   EXPECT_EQ(write_voxels_ply(path, volume, ColorTransform(ColorSpace::kRgb), 0.3f, 0.2f), 2);
 
@@ -48,14 +51,13 @@ TEST(VoxelsPly, HoldsTheOpaqueVoxelsOfTheBoxAsPoints) {
   EXPECT_EQ(floats[0], 3.5f);
   EXPECT_NEAR(rgb[0], 127.5, 0.6);
   EXPECT_EQ(rgb[2], 0);
-  std::filesystem::remove(path);
 }
 
 TEST(VoxelsPly, AnEmptyVolumeIsAnEmptyCloud) {
-  const auto path = std::filesystem::path(testing::TempDir()) / "roxel_no_voxels.ply";
+  const TempFolder folder;
+  const auto path = folder / "voxels.ply";
   EXPECT_EQ(write_voxels_ply(path, Volume(), ColorTransform(), 0.5f, 0), 0);
   EXPECT_TRUE(std::filesystem::exists(path));
-  std::filesystem::remove(path);
 }
 
 }  // namespace

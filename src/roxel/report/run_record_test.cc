@@ -7,6 +7,7 @@
 
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 
 namespace roxel {
 namespace {
@@ -15,18 +16,12 @@ namespace fs = std::filesystem;
 
 class RunRecordTest : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / (std::string("roxel-run-record-") +
-                                              testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   void write_summary(const RunRecord& record) {
     write_text_atomically(folder_ / "summary.json", to_json(record).dump());
   }
 
-  fs::path folder_;
+  const TempFolder temporary_;
+  const fs::path folder_ = temporary_.path();
 };
 
 RunRecord small_record() {

@@ -1,7 +1,5 @@
 #include "roxel/synth/demo_world.h"
 
-#include <unistd.h>
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include <sstream>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 
 namespace roxel {
 namespace {
@@ -19,23 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
-
-/// A fresh folder that goes away again.
-class Folder {
- public:
-  explicit Folder(const std::string& name)
-      : path_(fs::temp_directory_path() / ("roxel_synth_" + name + "_" + std::to_string(getpid()))) {
-    fs::remove_all(path_);
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 /// Everything that a run hands to its writers, by the path below the data set.
 struct Written {
@@ -74,13 +56,13 @@ std::string text_of(const fs::path& path) {
 }
 
 struct WorldOnDisk {
-  explicit WorldOnDisk(const std::string& name, const DemoWorldOptions& options, int threads) : folder(name) {
+  WorldOnDisk(const DemoWorldOptions& options, int threads) {
     RunContext context(threads);
     write_demo_world(folder.path(), options, written.writers(folder.path()), context);
   }
   std::string text(const char* file) const { return text_of(folder.path() / file); }
 
-  Folder folder;
+  const TempFolder folder;
   Written written;
 };
 
@@ -187,7 +169,7 @@ TEST(DemoCameras, SeeTheWholeBoxesContent) {
 }
 
 TEST(DemoWorld, IsTheSameForAnyNumberOfThreads) {
-  const WorldOnDisk one("t1", small_world(), 1), three("t3", small_world(), 3);
+  const WorldOnDisk one(small_world(), 1), three(small_world(), 3);
   EXPECT_EQ(one.written.floats.size(), 12u);
   EXPECT_EQ(one.written.masks.size(), 6u);
   EXPECT_EQ(one.written.floats, three.written.floats);
@@ -202,9 +184,9 @@ TEST(DemoWorld, IsTheSameForAnyNumberOfThreads) {
 TEST(DemoWorld, SeedsDiffer) {
   DemoWorldOptions options = small_world();
   options.images = 2;
-  const WorldOnDisk first("s1", options, 1);
+  const WorldOnDisk first(options, 1);
   options.seed = 2;
-  const WorldOnDisk second("s2", options, 1);
+  const WorldOnDisk second(options, 1);
   EXPECT_NE(first.written.floats.at("images/000.png"), second.written.floats.at("images/000.png"));
   EXPECT_NE(first.written.floats.at("depth/000.exr"), second.written.floats.at("depth/000.exr"));
 }
@@ -212,9 +194,9 @@ TEST(DemoWorld, SeedsDiffer) {
 TEST(DemoWorld, SkyIsBrightAndBlackIsBlackBehindTheSameIsland) {
   DemoWorldOptions options = small_world();
   options.images = 2;
-  const WorldOnDisk black("black", options, 1);
+  const WorldOnDisk black(options, 1);
   options.background = DemoBackground::kSky;
-  const WorldOnDisk sky("sky", options, 1);
+  const WorldOnDisk sky(options, 1);
   const auto& dark = black.written.floats.at("images/000.png");
   const auto& bright = sky.written.floats.at("images/000.png");
   const auto& mask = black.written.masks.at("mask/000.png");
@@ -242,7 +224,7 @@ std::vector<double> numbers(const std::string& line) {
 
 TEST(DemoWorld, SparsePointsLieWhereTheirImagesSeeThem) {
   const DemoWorldOptions options = small_world();
-  const WorldOnDisk run("points", options, 2);
+  const WorldOnDisk run(options, 2);
   const auto cameras = demo_cameras(options);
 
   std::vector<std::vector<double>> seen;  // per image: u, v, point id, ...
@@ -277,16 +259,16 @@ TEST(DemoWorld, SparsePointsLieWhereTheirImagesSeeThem) {
 TEST(DemoWorld, RefusesOptionsOutOfRange) {
   RunContext context(1);
   Written written;
-  const Folder folder("bad");
+  const TempFolder temporary;
+  const fs::path folder = temporary / "bad";
   for (auto spoil :
        {+[](DemoWorldOptions& o) { o.images = 1; }, +[](DemoWorldOptions& o) { o.width = 4; },
         +[](DemoWorldOptions& o) { o.samples_per_axis = 0; }, +[](DemoWorldOptions& o) { o.points = -1; }}) {
     DemoWorldOptions options = small_world();
     spoil(options);
-    EXPECT_THROW(write_demo_world(folder.path(), options, written.writers(folder.path()), context),
-                 InvalidInput);
+    EXPECT_THROW(write_demo_world(folder, options, written.writers(folder), context), InvalidInput);
   }
-  EXPECT_FALSE(fs::exists(folder.path()));
+  EXPECT_FALSE(fs::exists(folder));
   EXPECT_THROW(parse_demo_background("green"), InvalidInput);
   EXPECT_EQ(parse_demo_background("sky"), DemoBackground::kSky);
 }
@@ -295,7 +277,7 @@ TEST(DemoWorld, StopsWhenCancelledAndLeavesNoCameras) {
   RunContext context(2);
   context.cancel();
   Written written;
-  const Folder folder("cancel");
+  const TempFolder folder;
   EXPECT_THROW(write_demo_world(folder.path(), small_world(), written.writers(folder.path()), context),
                Cancelled);
   EXPECT_FALSE(fs::exists(folder.path() / "transforms.json"));

@@ -1,7 +1,5 @@
 #include "roxel/synth/world_writer.h"
 
-#include <unistd.h>
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,6 +10,7 @@
 #include <sstream>
 
 #include "roxel/base/error.h"
+#include "roxel/base/temp_folder.h"
 
 namespace roxel {
 namespace {
@@ -23,7 +22,7 @@ using nlohmann::json;
 /// A data set on disk, its pixels in memory.
 class Made {
  public:
-  Made(WorldKind kind, const SynthOptions& options, int threads = 2) : folder_(fresh_folder()) {
+  Made(WorldKind kind, const SynthOptions& options, int threads = 2) {
     RunContext context(threads);
     const auto keep = [this](const fs::path& path, const Image& image) {
       const std::lock_guard lock(mutex_);
@@ -34,10 +33,6 @@ class Made {
       masks[fs::relative(path, folder_).string()] = mask;
     };
     summary = write_world(folder_, kind, options, {keep, keep_mask, keep, keep}, context);
-  }
-  ~Made() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
   }
   std::string text(const std::string& file) const {
     std::ifstream in(folder_ / file, std::ios::binary);
@@ -54,12 +49,8 @@ class Made {
   SynthSummary summary;
 
  private:
-  static fs::path fresh_folder() {
-    static int count = 0;
-    return fs::temp_directory_path() /
-           ("roxel_world_" + std::to_string(getpid()) + "_" + std::to_string(count++));
-  }
-  fs::path folder_;
+  const TempFolder temporary_;
+  const fs::path folder_ = temporary_ / "world";
   std::mutex mutex_;
 };
 
@@ -259,7 +250,8 @@ TEST(WorldWriter, TheTableHasNoMasks) {
 
 TEST(WorldWriter, RefusesOptionsOutOfRange) {
   RunContext context(1);
-  const fs::path folder = fs::temp_directory_path() / "roxel_world_never";
+  const TempFolder temporary;
+  const fs::path folder = temporary / "never";
   for (auto spoil :
        {+[](SynthOptions& o) { o.images = 1; }, +[](SynthOptions& o) { o.width = 4; },
         +[](SynthOptions& o) { o.samples = 0; }, +[](SynthOptions& o) { o.noise = -1; },
