@@ -52,8 +52,7 @@ DenseMaps dense_maps(const DepthLayers& layers, const PinholeCamera& camera, dou
   PlaneMap fitted;
   const double focal = 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy);
   if (layers.normal.empty())
-    fitted =
-        fit_planes(maps.depth, layers.variance, focal, plane_radius(maps.depth, focal, voxel_size), false);
+    fitted = fit_planes(maps.depth, layers.variance, focal, plane_radius(maps.depth, focal, voxel_size));
   for (int y = 0; y < maps.depth.height(); ++y)
     for (int x = 0; x < maps.depth.width(); ++x) {
       if (!(*maps.depth.pixel(x, y) > 0)) continue;

@@ -40,7 +40,7 @@ class KeptPlanes {
         plane.data()[i] = c == 0 ? map.planes[i].w : c == 1 ? map.planes[i].wu : map.planes[i].wv;
       channels.push_back({kPlaneChannels[c], std::move(plane)});
     }
-    write_exr(file(view_idx), channels);
+    write_exr(file(view_idx), channels, ExrPrecision::kFloat, ExrCompression::kNone);
   }
 
   RefinedView recall(int view_idx) const {
@@ -113,7 +113,8 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
   };
   files.write = [&](int v, const DepthLayers& layers) {
     write_depth(depth_path(folders.results, dataset.views[v].name), layers);
-    write_picture(folders.results, dataset.views[v], layers);
+    if (!options.refine || !layers.depth_refined.empty())
+      write_picture(folders.results, dataset.views[v], layers);
   };
   files.keep = [&](int v, const RefinedView& view) { kept.keep(v, view); };
   files.recall = [&](int v) { return kept.recall(v); };

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <list>
+#include <future>
 #include <map>
 #include <mutex>
 #include <numbers>
@@ -30,6 +30,25 @@ class Clock {
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// One piece of work at a time beside the caller's own, such as writing what is ready: it throws when the
+/// next one starts, or in the end.
+class Aside {
+ public:
+  explicit Aside(bool allowed) : policy_(allowed ? std::launch::async : std::launch::deferred) {}
+  template <class Work>
+  void start(Work work) {
+    finish();
+    work_ = std::async(policy_, std::move(work));
+  }
+  void finish() {
+    if (work_.valid()) work_.get();
+  }
+
+ private:
+  std::launch policy_;
+  std::future<void> work_;
 };
 
 /// The views used last, as long as they fit.
@@ -148,15 +167,18 @@ class DepthStage {
     set_scale();
     ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24);
     std::vector<std::vector<int>> sources(count_);
+    Aside writing(context_.thread_count() > 1);
     for (int v = 0; v < count_; ++v) {
-      sources[v] = refine_one(v, views);
+      sources[v] = refine_one(v, views, writing);
       report("refining depth", 5);
     }
+    writing.finish();
     ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 24);
     for (int v = 0; v < count_; ++v) {
-      agree_one(v, sources[v], refined);
+      agree_one(v, sources[v], refined, writing);
       report("refining depth", 1);
     }
+    writing.finish();
     figures_.refine_seconds = clock.seconds();
   }
 
@@ -213,15 +235,15 @@ class DepthStage {
     return view;
   }
 
-  std::vector<int> refine_one(int v, ViewCache<MatchView>& views) {
+  std::vector<int> refine_one(int v, ViewCache<MatchView>& views, Aside& writing) {
     const auto own = views.get({v}, small_, context_).front();
     const std::vector<int> sources = choose_sources(small_, v, own->depth, options_.refine_views);
     const auto held = views.get(sources, small_, context_);
     std::vector<const MatchView*> pointers;
     for (const auto& view : held) pointers.push_back(view.get());
     const double focal = mean_focal(own->camera);
-    const PlaneMap start = fit_planes(own->depth, own->variance, focal,
-                                      plane_radius(own->depth, focal, scene_.voxel_size), false);
+    const PlaneMap start =
+        fit_planes(own->depth, own->variance, focal, plane_radius(own->depth, focal, scene_.voxel_size));
     RefineOptions options;
     options.patch.radius = options_.refine_radius;
     options.patch.noise = options_.refine_noise;
@@ -231,9 +253,10 @@ class DepthStage {
     options.iterations = options_.refine_rounds;
     options.sigmas = options_.refine_sigmas;
     options.seed = options_.refine_seed;
-    RefinedView refined = refine_view(*own, pointers, start, options, context_);
-    doubt_unmatched(v, refined);
-    files_.keep(v, refined);
+    writing.start([this, v, refined = refine_view(*own, pointers, start, options, context_)]() mutable {
+      doubt_unmatched(v, refined);
+      files_.keep(v, refined);
+    });
     return sources;
   }
 
@@ -249,7 +272,7 @@ class DepthStage {
     }
   }
 
-  void agree_one(int v, const std::vector<int>& sources, ViewCache<RefinedView>& refined) {
+  void agree_one(int v, const std::vector<int>& sources, ViewCache<RefinedView>& refined, Aside& writing) {
     const auto own = refined.get({v}, small_, context_).front();
     AgreedView agreed{own->planes, own->variance, Image(own->planes.width, own->planes.height, 1)};
     if (options_.refine_agree) {
@@ -259,7 +282,7 @@ class DepthStage {
         others.push_back({held[i].get(), PatchWarp(small_.views[v].camera, small_.views[sources[i]].camera)});
       agreed = agree_views(*own, others, context_);
     }
-    write_refined(v, agreed, own->correlation);
+    writing.start([this, v, own, agreed = std::move(agreed)] { write_refined(v, agreed, own->correlation); });
   }
 
   /// Each pixel's depth on the plane that shows its surface; as it was before, with the variance that it had,

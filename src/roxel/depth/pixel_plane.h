@@ -39,9 +39,9 @@ Eigen::Vector3d world_normal(const PinholeCamera& camera, const PixelPlane& plan
 PixelPlane plane_of_normal(const PinholeCamera& camera, double w, const Eigen::Vector3d& normal, double u0,
                            double v0);
 
-/// Planes through each pixel's neighbours within `radius` pixels, as they agree with the pixel: least
-/// squares, weighted by 1 / variance, neighbours behind a gap in depth left out. Pixels without depth (0)
-/// have none. The plane passes through the fitted depth where `fitted`, else through the pixel's own.
-PlaneMap fit_planes(const Image& depth, const Image& variance, double focal_px, int radius, bool fitted);
+/// Planes with the slope of each pixel's neighbours within `radius` pixels, as they agree with the pixel:
+/// least squares, weighted by 1 / variance, neighbours behind a gap in depth left out; they pass through the
+/// pixel's own depth. Pixels without depth (0) have none.
+PlaneMap fit_planes(const Image& depth, const Image& variance, double focal_px, int radius);
 
 }  // namespace roxel

@@ -67,7 +67,7 @@ class LatticeBuilder {
   /// say.
   void add_steps() {
     const PlaneMap planes = fit_planes(depth_, layers_.variance, guide_.focal_px,
-                                       plane_radius(depth_, guide_.focal_px, guide_.voxel_size), false);
+                                       plane_radius(depth_, guide_.focal_px, guide_.voxel_size));
     field_.right_step.assign(field_.mean.size(), 0);
     field_.down_step.assign(field_.mean.size(), 0);
     const auto between = [&](std::size_t a, std::size_t b, float du, float dv) -> float {

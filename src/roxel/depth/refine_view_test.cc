@@ -38,7 +38,7 @@ class RefineView : public ::testing::Test {
     for (const auto& [x, y, light] : {std::array{0.6, 0.0, 1.0}, {-0.5, 0.2, 0.6}, {0.1, -0.6, 1.3}})
       sources_.push_back(SlantedPlane::view(x, y, light, -0.02, 0.03));
     options_.patch.gap = 0.2;
-    start_ = fit_planes(view_.depth, view_.variance, 90, 3, false);
+    start_ = fit_planes(view_.depth, view_.variance, 90, 3);
   }
   RefinedView refine(int threads = 1) const {
     std::vector<const MatchView*> pointers;

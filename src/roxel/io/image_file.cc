@@ -186,7 +186,8 @@ std::vector<FloatChannel> rgb_channels(const Image& rgb) {
   return channels;
 }
 
-void write_exr(const std::string& path, const std::vector<FloatChannel>& channels, ExrPrecision precision) {
+void write_exr(const std::string& path, const std::vector<FloatChannel>& channels, ExrPrecision precision,
+               ExrCompression compression) {
   ROXEL_CHECK(!channels.empty());
   const Image& first = channels.front().plane;
   const std::size_t count = channels.size();
@@ -209,7 +210,7 @@ void write_exr(const std::string& path, const std::vector<FloatChannel>& channel
     for (float& value : values) value = std::clamp(value, -kLargestHalf, kLargestHalf);
   spec.alpha_channel = -1;  // planes are numbers, not colours: nothing is multiplied by a plane called A
   spec.z_channel = -1;
-  spec.attribute("compression", "zip:2");
+  spec.attribute("compression", compression == ExrCompression::kNone ? "none" : "zip:2");
   spec.attribute("DateTime", "1970:01:01 00:00:00");  // else it is now, and equal pixels make unequal files
   write_with(path, "openexr", spec, OIIO::TypeFloat, values.data());
 }

@@ -55,9 +55,13 @@ struct FloatChannel {
 /// becomes that).
 enum class ExrPrecision { kFloat, kHalf };
 
+/// kNone is for files that are soon read again and go.
+enum class ExrCompression { kZip, kNone };
+
 /// All planes of one size, at least one; names are unique.
 void write_exr(const std::string& path, const std::vector<FloatChannel>& channels,
-               ExrPrecision precision = ExrPrecision::kFloat);
+               ExrPrecision precision = ExrPrecision::kFloat,
+               ExrCompression compression = ExrCompression::kZip);
 
 /// The channels R, G, B of an image of three.
 std::vector<FloatChannel> rgb_channels(const Image& rgb);
