@@ -10,12 +10,12 @@ namespace roxel {
 namespace {
 
 /// Errors of a volume's depth are alike within a voxel: so many voxels' pixels count as one witness.
-constexpr double kVoxelsAlike = 1.5;
+constexpr double kVoxelsAlike = 0.7;
 constexpr double kGapVoxels = 0.3;         ///< roughness of the volume that is no gap
 constexpr double kMedianToSigma = 1.4826;  ///< of a Gaussian's absolute values
-constexpr float kLikeColor = 0.08f;        ///< difference of luma at which a tie is 1 / e^0.5 as strong
+constexpr float kLikeColor = 0.05f;        ///< difference of luma at which a tie is 1 / e^0.5 as strong
 constexpr float kWeakestColor = 0.02f;
-constexpr float kGapSigmas = 3;  ///< deviations at which a gap halves a tie's square root
+constexpr float kGapSigmas = 1;  ///< deviations at which a gap halves a tie's square root
 
 /// Builds the lattice of one view.
 class LatticeBuilder {
