@@ -210,6 +210,16 @@ class Config(Case):
         self.assertEqual(first["options"], second["options"])
         self.assertEqual(first["views"], second["views"])
 
+    def test_bounds_may_stand_in_a_file(self):
+        file = self.folder / "box.txt"
+        file.write_text("-1, -1.5 -1\n1 1.5, 1e0\n")
+        _, summary = self.reconstruct("box", "--bounds", file)
+        self.assertEqual(summary["options"]["bounds"], [-1, -1.5, -1, 1, 1.5, 1])
+        for text, found in (("-1 -1 zero\n1 1 1", "-1,-1,zero,1,1,1"), ("1 2 3", "1,2,3"), ("", "")):
+            file.write_text(text)
+            self.expect_error(2, f'--bounds: {file}: found "{found}", expected 6 numbers', "info", self.data, "--bounds", file)
+        self.expect_error(2, "or the name of a file that holds them", "info", self.data, "--bounds", self.folder / "no-box.txt")
+
     def test_mistakes_in_the_file_name_the_file_and_the_key(self):
         out = self.folder / "never"
         for text, message in [('{"pases": 3}', '"pases": found an unknown option'), ('{"passes": "many"}', '"passes"'),
@@ -285,7 +295,7 @@ DEPTH_CHANGES = {
     "refine-radius": ([], ["--refine-radius", "2"]),
     "refine-rounds": ([], ["--refine-rounds", "0"]),
     "refine-scale": ([], ["--refine-scale", "1"]),
-    "refine-seed": ([], ["--refine-seed", "7"]),
+    "seed": ([], ["--seed", "7"]),
     "refine-sigmas": ([], ["--refine-sigmas", "0.5"]),
     "refine-views": ([], ["--refine-views", "1"]),
 }

@@ -63,7 +63,8 @@ std::string OptionField::expected() const {
     case OptionKind::kNumber:
       return with_range("a number", *this);
     case OptionKind::kNumbers:
-      return with_range(std::to_string(count) + " numbers", *this);
+      return with_range(std::to_string(count) + " numbers", *this) +
+             (or_file ? ", or the name of a file that holds them" : "");
     case OptionKind::kText:
       return "text";
     case OptionKind::kChoice:
@@ -96,6 +97,11 @@ OptionDeclaration& OptionDeclaration::source(std::string text) {
 
 OptionDeclaration& OptionDeclaration::placeholder(std::string text) {
   field_.placeholder = std::move(text);
+  return *this;
+}
+
+OptionDeclaration& OptionDeclaration::or_file() {
+  field_.or_file = true;
   return *this;
 }
 

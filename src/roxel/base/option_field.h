@@ -27,6 +27,7 @@ struct OptionField {
   std::string unset_text;   ///< for optional fields: what happens when left out, e.g. "from the cameras"
   OptionKind kind = OptionKind::kText;
   bool optional = false;
+  bool or_file = false;              ///< on the command line, numbers may stand in a file whose name is given
   std::size_t count = 1;             ///< how many numbers, for kNumbers
   std::vector<std::string> choices;  ///< legal names, for kChoice
   double low = -std::numeric_limits<double>::infinity();
@@ -60,6 +61,8 @@ class OptionDeclaration {
   OptionDeclaration& unit(std::string text);
   OptionDeclaration& source(std::string text);
   OptionDeclaration& placeholder(std::string text);
+  /// A list of numbers may be given as the name of a text file that holds them.
+  OptionDeclaration& or_file();
   /// What an optional field left out means, e.g. "from the cameras and points".
   OptionDeclaration& unset(std::string text);
   /// Ranges are for integers, numbers and each entry of a list of numbers.

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 #include "roxel/base/error.h"
@@ -75,6 +77,20 @@ json parse_without_repeated_keys(std::istream& in, const std::string& where) {
   }
 }
 
+/// What a short text file holds, as it would be written on the command line: "1,2,3".
+std::string numbers_in(const std::string& file) {
+  std::ifstream in(file);
+  if (!in) throw IoError(file + ": cannot be read");
+  constexpr int kMostCharacters = 4096;
+  std::string content(kMostCharacters, '\0');
+  in.read(content.data(), kMostCharacters);
+  content.resize(static_cast<std::size_t>(in.gcount()));
+  std::replace(content.begin(), content.end(), ',', ' ');
+  std::istringstream words(content);
+  std::vector<std::string> numbers{std::istream_iterator<std::string>(words), {}};
+  return join(numbers, ",");
+}
+
 }  // namespace
 
 OptionField& OptionTableCore::add(OptionField field) {
@@ -98,6 +114,13 @@ void OptionTableCore::set(void* options, const std::string& name, const std::str
                           const std::string& where) const {
   const auto [field, negated] = look_up(name, where);
   std::optional<OptionValue> value = parse_text(*field, text);
+  if (!value && field->or_file && std::filesystem::is_regular_file(text)) {
+    const std::string numbers = numbers_in(text);
+    value = parse_text(*field, numbers);
+    if (!value || !is_legal(*field, *value))
+      throw_invalid(place(where, name) + ": " + text, quoted(numbers),
+                    std::to_string(field->count) + " numbers, apart by blanks, commas or new lines");
+  }
   if (!value || !is_legal(*field, *value)) throw_invalid(place(where, name), quoted(text), field->expected());
   if (negated) value = negation(*value);
   field->set(options, *value);

@@ -252,7 +252,7 @@ class DepthStage {
     options.sources = options_.refine_views;
     options.iterations = options_.refine_rounds;
     options.sigmas = options_.refine_sigmas;
-    options.seed = options_.refine_seed;
+    options.seed = options_.seed;
     writing.start([this, v, refined = refine_view(*own, pointers, start, options, context_)]() mutable {
       doubt_unmatched(v, refined);
       files_.keep(v, refined);
@@ -392,7 +392,7 @@ OptionTable<DepthStageOptions> make_table() {
       .help("Deviation by which calibration puts a point beside where it is in a photograph")
       .unit("pixels")
       .range(0, 10);
-  table.add("refine-seed", &Options::refine_seed).help("Draws other random planes").at_least(0);
+  table.add("seed", &Options::seed).help("Draws other random planes in refinement").at_least(0);
   table.add("refine-agree", &Options::refine_agree).help("Join what several views say of the same surface");
   return table;
 }

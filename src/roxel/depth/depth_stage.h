@@ -29,7 +29,7 @@ struct DepthStageOptions {
   double refine_sigmas = 4;
   double refine_noise = 0.006;
   double refine_pixel_sigma = 0.035;
-  std::int64_t refine_seed = 1;
+  std::int64_t seed = 1;
   bool refine_agree = true;
 };
 

@@ -143,6 +143,8 @@ const BadSet kBadSets[] = {
     {"NothingKnown", Base::kEmpty, write("readme.md", "hello"), {"1 entry (readme.md)", "*_par.txt"}},
     {"UnknownFormat", Base::kColmapText, kNothing, {"format", "'bundler'", "colmap"}, with_format("bundler")},
     {"ColmapAskedForButTransforms", Base::kTransforms, kNothing, {"transforms files in", "transforms.json", "format colmap was asked for"}, with_format("colmap")},
+    {"TwoFormats", Base::kMiddlebury, [](const fs::path& set) { write_strecha(set, textbook_cameras(3)); }, {"files of the formats middlebury and strecha", "--format"}},
+    {"TwoFormatsBesideTransforms", Base::kTransforms, [](const fs::path& set) { write_colmap_text(set, textbook_cameras(3)), write_middlebury(set, textbook_cameras(3)); }, {"transforms and colmap and middlebury", "--format"}},
     {"TransformsAskedForButColmap", Base::kColmapText, kNothing, {"colmap files in", "format transforms was asked for"}, with_format("transforms")},
     {"NodesOutOfRange", Base::kColmapText, kNothing, {"nodes", "'7:9'", "3 nodes"}, with_nodes("7:9")},
     {"NodesNotARange", Base::kColmapText, kNothing, {"nodes", "'seven'", "A:B"}, with_nodes("seven")},

@@ -127,16 +127,17 @@ Dataset read_detected(const fs::path& path) {
     throw_invalid(path.string(), fs::is_directory(path) ? describe_folder(path) : "a plain file",
                   "one of: " + all_formats());
   }
-  Dataset dataset = there[0]->read(path);
-  dataset.format = there[0]->name;
-  for (std::size_t i = 1; i < there.size(); ++i) {
-    const std::string name = there[i]->name;
-    if (dataset.format == "transforms" && name == "colmap") {
-      take_colmap_points(path, dataset);
-    } else {
-      dataset.notes.push_back("read as " + dataset.format + "; there are also files of format " + name);
-    }
+  const std::string first = there[0]->name;
+  const bool both = there.size() == 2 && first == "transforms" && std::string("colmap") == there[1]->name;
+  if (there.size() > 1 && !both) {
+    std::string names = first;
+    for (std::size_t i = 1; i < there.size(); ++i) names += std::string(" and ") + there[i]->name;
+    throw_invalid(path.string(), "files of the formats " + names,
+                  "one format, or --format to say which is meant");
   }
+  Dataset dataset = there[0]->read(path);
+  dataset.format = first;
+  if (both) take_colmap_points(path, dataset);
   return dataset;
 }
 

@@ -9,8 +9,9 @@ using Options = ReconstructOptions;
 void add_volume(OptionTable<Options>& table) {
   table.group("Volume");
   table.add("bounds", &Options::bounds)
-      .help("Box to reconstruct: x0,y0,z0,x1,y1,z1")
+      .help("Box to reconstruct: x0,y0,z0,x1,y1,z1, or a text file with these six numbers")
       .unit("world units")
+      .or_file()
       .unset("from the data set, its points, masks, or cameras");
   table.add("near", &Options::near)
       .help("Nearest depth that is looked for")
