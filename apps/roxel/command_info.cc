@@ -8,6 +8,7 @@ namespace {
 
 struct InfoOptions {
   ReconstructOptions reconstruct;
+  DepthStageOptions depth;
   InputOptions input;
   CommonOptions common;
 };
@@ -16,6 +17,7 @@ OptionTable<InfoOptions> info_table() {
   OptionTable<InfoOptions> table;
   table.include(input_option_table(), &InfoOptions::input);
   table.include(reconstruct_option_table(), &InfoOptions::reconstruct);
+  table.include(depth_option_table(), &InfoOptions::depth);
   table.include(common_option_table(), &InfoOptions::common);
   return table;
 }
@@ -23,7 +25,7 @@ OptionTable<InfoOptions> info_table() {
 int run_info(const Invocation& invocation, const InfoOptions& options) {
   Session session(options.common);
   const Input input = read_input(invocation.inputs.front(), options.input, session);
-  const Description description = describe(input, options.reconstruct, session.context());
+  const Description description = describe(input, options.reconstruct, options.depth, session.context());
   print_result(options.common, description.text, json_text(description.json));
   return 0;
 }

@@ -234,7 +234,8 @@ class Run {
   }
 
   int describe_only() {
-    const Description description = describe(input_, options_.reconstruct, session_.context());
+    const Description description =
+        describe(input_, options_.reconstruct, options_.depth, session_.context());
     session_.display().clear();
     print_result(options_.common, description.text, json_text(description.json));
     return 0;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "progress_display.h"
 #include "roxel/base/formatted.h"
@@ -100,25 +101,25 @@ std::string row(const std::string& label, const std::string& value) {
 /// texture; and refinement, of a pixel as it sees them. Others cost next to nothing.
 constexpr double kSurfaceSecondsPerPixel = 15e-6, kRefineSecondsPerPixel = 25e-6;
 
-double count_pixels(const Dataset& dataset) {
-  double pixels = 0;
-  for (const View& view : dataset.views)
-    pixels += static_cast<double>(view.camera.intrinsics.width) * view.camera.intrinsics.height;
-  return pixels;
+/// `voxel_px`: pixels that a voxel is across.
+double surface_seconds(const Dataset& dataset, double voxel_px, const DepthStageOptions& depth, int threads) {
+  const std::vector<double> pixels = pixels_of_views(dataset);
+  const int scale = depth.refine_scale.value_or(choose_scale({voxel_px}, pixels));
+  const double each = kSurfaceSecondsPerPixel + (depth.refine ? kRefineSecondsPerPixel / (scale * scale) : 0);
+  return each * std::reduce(pixels.begin(), pixels.end()) / threads;
 }
 
 }  // namespace
 
-Description describe(const Input& input, const ReconstructOptions& options, RunContext& context) {
+Description describe(const Input& input, const ReconstructOptions& options, const DepthStageOptions& depth,
+                     RunContext& context) {
   const Dataset& dataset = input.dataset;
   const Scene scene = preview_scene(input, options, context);
   const Eigen::Vector3i voxels = nested_frames(scene.bounds.box, scene.voxel_size, 0)[0].size_in_voxels();
   const BoxVisibility seen = box_visibility(dataset, scene.bounds, scene.voxel_size);
   const CostEstimate cost = estimate_cost(dataset, scene, options, context.thread_count());
-  const int refine_scale = choose_scale({seen.median_pixels_per_voxel});
   const double depth_seconds =
-      (kSurfaceSecondsPerPixel + kRefineSecondsPerPixel / (refine_scale * refine_scale)) *
-      count_pixels(dataset) / context.thread_count();
+      surface_seconds(dataset, seen.median_pixels_per_voxel, depth, context.thread_count());
   std::vector<std::string> warnings = dataset.warnings;
   warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
   if (!cost.memory.fits)
@@ -149,8 +150,8 @@ Description describe(const Input& input, const ReconstructOptions& options, RunC
   out.text += row("memory", memory_row(cost.memory));
   out.text += row(
       "time", "about " + duration_text(cost.seconds) + formatted(" on %d threads", context.thread_count()));
-  out.text += row("", "and up to " + duration_text(depth_seconds) +
-                          " for refined depth and the surface (--no-refine, --no-mesh)");
+  out.text += row("", "and up to " + duration_text(depth_seconds) + " for " +
+                          (depth.refine ? "refined " : "") + "depth and the surface");
   for (const std::string& note : notes)
     if (!note.starts_with("bounds:")) out.text += row("note", note);
   for (const std::string& warning : warnings) out.text += row("WARNING", warning);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common.h"
+#include "roxel/depth/depth_stage.h"
 #include "roxel/solve/options.h"
 
 namespace roxel::cli {
@@ -14,6 +15,7 @@ struct Description {
   nlohmann::ordered_json json;
 };
 
-Description describe(const Input& input, const ReconstructOptions& options, RunContext& context);
+Description describe(const Input& input, const ReconstructOptions& options, const DepthStageOptions& depth,
+                     RunContext& context);
 
 }  // namespace roxel::cli

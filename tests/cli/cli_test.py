@@ -294,7 +294,7 @@ DEPTH_CHANGES = {
     "refine-pixel-sigma": ([], ["--refine-pixel-sigma", "1"]),
     "refine-radius": ([], ["--refine-radius", "2"]),
     "refine-rounds": ([], ["--refine-rounds", "0"]),
-    "refine-scale": ([], ["--refine-scale", "1"]),
+    "refine-scale": ([], ["--refine-scale", "2"]),
     "seed": ([], ["--seed", "7"]),
     "refine-sigmas": ([], ["--refine-sigmas", "0.5"]),
     "refine-views": ([], ["--refine-views", "1"]),
@@ -637,6 +637,10 @@ class OtherCommands(Case):
         self.assertEqual((info["format"], info["images"], info["nodes"], info["image_sizes"]), ("transforms", 4, 4, "64 x 48"))
         self.assertEqual(info["voxels"], [256, 256, 256])
         self.assertGreater(info["estimate"]["memory_bytes"], 1e6)
+        seconds = [json.loads(self.succeed("info", self.data, "--json", *refining).stdout)["estimate"]["depth_seconds"]
+                   for refining in ([], ["--refine-scale", "4"], ["--no-refine"])]
+        self.assertEqual(seconds, sorted(seconds, reverse=True))
+        self.assertEqual(len(set(seconds)), 3)
         fine = json.loads(self.succeed("info", self.data, "--json", "--resolution", "512").stdout)
         self.assertTrue(any("pixel" in warning for warning in fine["warnings"]), fine["warnings"])
 

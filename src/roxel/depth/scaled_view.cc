@@ -8,6 +8,7 @@ namespace roxel {
 namespace {
 
 constexpr double kLeastVoxel = 1.5;  ///< pixels: what refinement was measured at on worlds with known depth
+constexpr double kLeastPixels = 250e3;  ///< of a view that was made smaller
 constexpr int kMostScale = 16;
 constexpr int kDepthStride = 8;  ///< pixels between depths whose median is taken
 
@@ -20,12 +21,20 @@ double median(std::vector<double>& values) {
 
 }  // namespace
 
-int choose_scale(std::vector<double> voxel_pixels) {
+int choose_scale(std::vector<double> voxel_pixels, std::vector<double> view_pixels) {
   std::erase_if(voxel_pixels, [](double pixels) { return !(pixels > 0); });
-  const double across = median(voxel_pixels);
+  const double across = median(voxel_pixels), pixels = median(view_pixels);
   int scale = 1;
-  while (2 * scale <= kMostScale && across / (2 * scale) >= kLeastVoxel) scale *= 2;
+  for (int next = 2; next <= kMostScale; next *= 2)
+    if (across / next >= kLeastVoxel && pixels / (next * next) >= kLeastPixels) scale = next;
   return scale;
+}
+
+std::vector<double> pixels_of_views(const Dataset& dataset) {
+  std::vector<double> pixels;
+  for (const View& view : dataset.views)
+    pixels.push_back(static_cast<double>(view.camera.intrinsics.width) * view.camera.intrinsics.height);
+  return pixels;
 }
 
 double voxel_in_pixels(const Image& depth, double focal_px, double voxel_size) {

@@ -10,12 +10,21 @@ namespace {
 using fixture::SlantedPlane;
 
 TEST(ChooseScale, LeavesTheMedianVoxelOneAndAHalfPixels) {
-  EXPECT_EQ(choose_scale({1.6}), 1);
-  EXPECT_EQ(choose_scale({2.9, 2.9, 40}), 1);
-  EXPECT_EQ(choose_scale({3.0}), 2);
-  EXPECT_EQ(choose_scale({0, 0, 0, 6.5, 6.5}), 4);  // views without depth say nothing
-  EXPECT_EQ(choose_scale({1e9}), 16);
-  EXPECT_EQ(choose_scale({}), 1);
+  const double large = 1e9;
+  EXPECT_EQ(choose_scale({1.6}, {large}), 1);
+  EXPECT_EQ(choose_scale({2.9, 2.9, 40}, {large}), 1);
+  EXPECT_EQ(choose_scale({3.0}, {large}), 2);
+  EXPECT_EQ(choose_scale({0, 0, 0, 6.5, 6.5}, {large}), 4);  // views without depth say nothing
+  EXPECT_EQ(choose_scale({1e9}, {large}), 16);
+  EXPECT_EQ(choose_scale({}, {}), 1);
+}
+
+TEST(ChooseScale, LeavesTheMedianViewAQuarterOfAMillionPixels) {
+  EXPECT_EQ(choose_scale({20}, {352 * 288}), 1);
+  EXPECT_EQ(choose_scale({20}, {999999}), 1);
+  EXPECT_EQ(choose_scale({20}, {1e6}), 2);
+  EXPECT_EQ(choose_scale({20}, {100, 1e6, 1600 * 1200}), 2);
+  EXPECT_EQ(choose_scale({20}, {4e6}), 4);
 }
 
 TEST(VoxelInPixels, IsThatOfTheMedianDepth) {
