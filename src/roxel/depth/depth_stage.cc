@@ -374,7 +374,7 @@ OptionTable<DepthStageOptions> make_table() {
       .help("Side of the squares of pixels that refinement sees as one")
       .unit("pixels")
       .range(1, 16)
-      .unset("as many as leave a voxel 1.5 of them and a view 250 000");
+      .unset("as many as leave a voxel 1.5 of them and a view 100 000");
   table.add("refine-views", &Options::refine_views).help("Views that a patch is looked for in").range(1, 32);
   table.add("refine-rounds", &Options::refine_rounds).help("Rounds of propagation over a view").range(0, 100);
   table.add("refine-radius", &Options::refine_radius)

@@ -8,7 +8,7 @@ namespace roxel {
 namespace {
 
 constexpr double kLeastVoxel = 1.5;  ///< pixels: what refinement was measured at on worlds with known depth
-constexpr double kLeastPixels = 250e3;  ///< of a view that was made smaller
+constexpr double kLeastPixels = 100e3;  ///< of a view that was made smaller
 constexpr int kMostScale = 16;
 constexpr int kDepthStride = 8;  ///< pixels between depths whose median is taken
 

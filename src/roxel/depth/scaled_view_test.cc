@@ -19,12 +19,12 @@ TEST(ChooseScale, LeavesTheMedianVoxelOneAndAHalfPixels) {
   EXPECT_EQ(choose_scale({}, {}), 1);
 }
 
-TEST(ChooseScale, LeavesTheMedianViewAQuarterOfAMillionPixels) {
+TEST(ChooseScale, LeavesTheMedianView100000Pixels) {
   EXPECT_EQ(choose_scale({20}, {352 * 288}), 1);
-  EXPECT_EQ(choose_scale({20}, {999999}), 1);
-  EXPECT_EQ(choose_scale({20}, {1e6}), 2);
-  EXPECT_EQ(choose_scale({20}, {100, 1e6, 1600 * 1200}), 2);
-  EXPECT_EQ(choose_scale({20}, {4e6}), 4);
+  EXPECT_EQ(choose_scale({20}, {399999}), 1);
+  EXPECT_EQ(choose_scale({20}, {400000}), 2);
+  EXPECT_EQ(choose_scale({20}, {100, 800 * 600, 1600 * 1200}), 2);
+  EXPECT_EQ(choose_scale({20}, {1.6e6}), 4);
 }
 
 TEST(VoxelInPixels, IsThatOfTheMedianDepth) {
