@@ -414,6 +414,22 @@ class Depth(Case):
         self.succeed("depth", out, "--quiet")
         self.assertFalse((out / "report.html").exists(), "a run without a page gets none")
 
+    def test_a_full_disc_leaves_the_earlier_depth_maps(self):
+        out, _ = self.reconstruct("full", "--no-render", "--no-mesh")
+        with_room = self.folder / "with-room"
+        shutil.copytree(out, with_room)
+        change = ["--no-refine", "--bp-sigma", "0.5", "--quiet"]
+        self.succeed("depth", with_room, *change)
+        largest = max(file.stat().st_size for file in (with_room / "depth").glob("*.exr"))
+        before = digests(out)
+        # The last lets all be written but a file's last few bytes, which a careless writer loses in silence.
+        for most_bytes in (largest // 10, largest // 2, largest - 10):
+            with self.subTest(most_bytes):
+                done = run_on_a_full_disc("depth", out, *change, most_bytes=most_bytes)
+                self.assertEqual(done.returncode, 1, done.stderr)
+                self.assertIn("cannot write", done.stderr)
+                self.assertEqual(digests(out), before)
+
     def test_a_run_without_depth_maps_is_marched_through(self):
         out, _ = self.reconstruct("bare", "--no-depth", "--no-render")
         said = json.loads(self.succeed("depth", out, "--json").stdout)

@@ -9,7 +9,7 @@
 namespace roxel {
 
 /// The largest power of two by which views may be made smaller so that the median voxel still is 1.5 pixels
-/// across and the median view still has a quarter of a million pixels (small photographs cost little, and
+/// across and the median view still has 100 000 pixels (small photographs cost little, and
 /// lose much: docs/results/surface.md); at most 16. `voxel_pixels`: pixels that a voxel is across, of each
 /// view (0: it has no depth, and says nothing). `view_pixels`: pixels of each view.
 int choose_scale(std::vector<double> voxel_pixels, std::vector<double> view_pixels);

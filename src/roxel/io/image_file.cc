@@ -1,12 +1,17 @@
 #include "roxel/io/image_file.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <set>
+#include <utility>
 
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
@@ -102,17 +107,52 @@ void decode_pixels(const ImageSource& source, const std::array<int, 3>& rgb, Ima
   }
 }
 
+/// A file for OpenImageIO to write to. Its own files are closed without a look at whether the last bytes found
+/// room, and a full disc would leave a file cut short that nobody complained of.
+class CheckedFile {
+ public:
+  CheckedFile(const std::string& name, const std::filesystem::path& path)
+      : name_(name), file_(std::fopen(path.c_str(), "wb")) {
+    if (!file_) fail();
+  }
+  ~CheckedFile() {
+    if (file_) std::fclose(file_);
+  }
+  CheckedFile(const CheckedFile&) = delete;
+  CheckedFile& operator=(const CheckedFile&) = delete;
+
+  std::FILE* handle() const { return file_; }
+
+  /// Throws IoError where not all that was written is in the file.
+  void close() {
+    const bool written = std::ferror(file_) == 0;
+    const bool closed = std::fclose(std::exchange(file_, nullptr)) == 0;
+    if (!written || !closed) fail();
+  }
+
+ private:
+  [[noreturn]] void fail() const {
+    throw IoError(name_ + ": cannot write (disc full, or no permission?): " + std::strerror(errno));
+  }
+
+  std::string name_;
+  std::FILE* file_;
+};
+
 /// Writes `values` of the spec's shape as the given format; `type` is that of the values in memory.
 void write_with(const std::string& path, const char* format, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
                 const void* values) {
   write_file_atomically(path, [&](const std::filesystem::path& temporary) {
-    const auto out = OIIO::ImageOutput::create(format);
+    CheckedFile file(path, temporary);
+    OIIO::Filesystem::IOFile proxy(file.handle(), OIIO::Filesystem::IOProxy::Write);
+    const auto out = OIIO::ImageOutput::create(format, &proxy);
     const std::string reason = OIIO::geterror();
-    if (!out) throw IoError(path + ": cannot write " + format + ": " + reason);
+    if (!out || !out->supports("ioproxy")) throw IoError(path + ": cannot write " + format + ": " + reason);
     out->threads(1);
     const bool written =
         out->open(temporary.string(), spec) && out->write_image(type, values) && out->close();
-    if (!written) throw IoError(path + ": cannot write: " + out->geterror());
+    if (!written) throw IoError(path + ": cannot write (disc full?): " + out->geterror());
+    file.close();
   });
 }
 

@@ -148,7 +148,12 @@ ImageSource read_image_source(const std::string& path) {
   const OIIO::ImageSpec& spec = in->spec();
   check_spec(path, spec);
   check_window(path, spec);
-  ImageSource source{path, spec.width, spec.height, spec.channelnames, spec.alpha_channel};
+  ImageSource source;
+  source.path = path;
+  source.width = spec.width;
+  source.height = spec.height;
+  source.channel_names = spec.channelnames;
+  source.alpha_channel = spec.alpha_channel;
   source.alpha_multiplied = spec.alpha_channel >= 0 && spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
   source.kind = sample_kind(spec.format);
   source.values.resize(source.pixels() * source.channels());
