@@ -22,6 +22,9 @@ constexpr double kIndependent = 0.25;        ///< share of a patch's samples tha
 constexpr double kIndependentErrors = 0.25;  ///< the same, for how far a depth may be off
 constexpr double kVolumeStretch =
     1.5;  ///< of the variance that rests on the volume: its errors are alike nearby
+constexpr float kFreedom =
+    4;  ///< of the Student distribution of the volume's errors in units of its deviation
+constexpr float kFirstReach = 6;         ///< deviations that the first random plane may be off
 constexpr double kSlopeSigma = 0.6;      ///< tangent by which the volume's normals err
 constexpr double kSteepestPlane = 6;     ///< tangent of the steepest plane
 constexpr float kLeastAgreement = 0.4f;  ///< correlation of a view that counts in the least squares
@@ -149,8 +152,9 @@ class ViewRefinement {
     const float tilt_u = (plane.wu - start.wu) * scale, tilt_v = (plane.wv - start.wv) * scale;
     const float steep_u = plane.wu * scale, steep_v = plane.wv * scale;
     if (steep_u * steep_u + steep_v * steep_v > kSteepestPlane * kSteepestPlane) return out;
-    const float prior = 0.5f * off * off + 0.5f * (tilt_u * tilt_u + tilt_v * tilt_v) /
-                                               static_cast<float>(kSlopeSigma * kSlopeSigma);
+    const float prior =
+        0.5f * (kFreedom + 1) * std::log1p(off * off / kFreedom) +
+        0.5f * (tilt_u * tilt_u + tilt_v * tilt_v) / static_cast<float>(kSlopeSigma * kSlopeSigma);
     if (prior >= limit) return out;
     std::array<Patch::Steps, 32> place;
     std::array<int, 32> view;
@@ -261,7 +265,7 @@ class ViewRefinement {
     for (int k = 0; k < 2; ++k) {
       const float size = std::ldexp(1.0f, -round - k);
       PixelPlane plane = best.plane;
-      plane.w += 2 * sigma * size * dice.roll();
+      plane.w += kFirstReach * sigma * size * dice.roll();
       plane.wu += 0.7f * slope * size * dice.roll();
       plane.wv += 0.7f * slope * size * dice.roll();
       attempt(plane);
@@ -307,12 +311,6 @@ class ViewRefinement {
     joint.b +=
         precision.cwiseProduct(Eigen::Vector3d(start.w - plane.w, start.wu - plane.wu, start.wv - plane.wv));
     return joint;
-  }
-
-  /// Whether the depth maps of other views speak for where the pixel was and against where it went.
-  bool contradicted(int x, int y, std::size_t i, const PixelPlane& plane) const {
-    const auto views = [&](const PixelPlane& p) { return std::popcount(seen_by(x, y, p, 0)); };
-    return 2 * views(plane) < views(start_.planes[i]);
   }
 
   /// Squares of how far points move in views, in pixels for a change of w by 1.
@@ -370,7 +368,6 @@ class ViewRefinement {
       } else {
         linearised = false;
       }
-      if (contradicted(x, y, i, best.plane)) best.plane = start_.planes[i], best.correlation = 0;
     }
     if (best.correlation > 0) {
       if (!patch) patch.emplace(patch_at(x, y));

@@ -107,8 +107,8 @@ void decode_pixels(const ImageSource& source, const std::array<int, 3>& rgb, Ima
   }
 }
 
-/// A file for OpenImageIO to write to. Its own files are closed without a look at whether the last bytes found
-/// room, and a full disc would leave a file cut short that nobody complained of.
+/// A file for OpenImageIO to write to. Its own files are closed without a look at whether the last bytes
+/// found room, and a full disc would leave a file cut short that nobody complained of.
 class CheckedFile {
  public:
   CheckedFile(const std::string& name, const std::filesystem::path& path)
