@@ -273,6 +273,12 @@ class ViewRefinement {
     best_[i] = best;
   }
 
+  /// Of w, where the plane is: that of the Gaussian that pulls as the Student distribution does there.
+  double prior_variance(const PixelPlane& plane, std::size_t i) const {
+    const double sigma = sigma_w(i), off = (plane.w - start_.planes[i].w) / sigma;
+    return sigma * sigma * std::max(1.0, (kFreedom + off * off) / (kFreedom + 1));
+  }
+
   /// Normal equations of all agreeing views, and of the prior.
   struct Joint {
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
@@ -305,8 +311,8 @@ class ViewRefinement {
     if (joint.views > 1 && weights > 0)
       joint.chi2 = (seconds - firsts * firsts / weights) / (joint.views - 1);
     const PixelPlane& start = start_.planes[i];
-    const double sigma = sigma_w(i), slope = kSlopeSigma * start.w / focal_;
-    const Eigen::Vector3d precision(1 / (sigma * sigma), 1 / (slope * slope), 1 / (slope * slope));
+    const double slope = kSlopeSigma * start.w / focal_;
+    const Eigen::Vector3d precision(1 / prior_variance(plane, i), 1 / (slope * slope), 1 / (slope * slope));
     joint.a.diagonal() += precision;
     joint.b +=
         precision.cwiseProduct(Eigen::Vector3d(start.w - plane.w, start.wu - plane.wu, start.wv - plane.wv));
@@ -374,9 +380,9 @@ class ViewRefinement {
       if (!linearised) joint = join(*patch, best.plane, best.agreeing, i);
       const std::uint32_t agreeing = best.agreeing;
       const double matched = joint.a.inverse()(0, 0);
-      const double from_volume = std::min(1.0, matched / prior);
+      const double here = prior_variance(best.plane, i), from_volume = std::min(1.0, matched / here);
       const double calibration = calibration_variance(x, y, best.plane, agreeing);
-      shared = std::min(prior, kVolumeStretch * from_volume * matched) + calibration;
+      shared = std::min(here, kVolumeStretch * from_volume * matched) + calibration;
       variance = (1 - from_volume) * matched * std::max(1.0, joint.chi2) + shared;
       out.correlation.data()[i] = std::max(0.0f, best.correlation);
     }

@@ -66,6 +66,23 @@ TEST_F(RefineView, FindsThePlaneThatThePhotographsShow) {
     }
 }
 
+// As where the volume has a false surface, for all views alike.
+TEST_F(RefineView, FindsThePlaneThoughTheVolumeIsSureOfAFalseOneInFront) {
+  view_ = SlantedPlane::view(0, 0, 1, -0.4, 0);  // eight deviations
+  sources_.clear();
+  for (const auto& [x, y] : {std::array{0.6, 0.0}, {-0.5, 0.2}, {0.1, -0.6}})
+    sources_.push_back(SlantedPlane::view(x, y, 1, -0.4, 0));
+  start_ = fit_planes(view_.depth, view_.variance, 90, 3);
+  options_.sigmas = 4;
+  const RefinedView held = refine();
+  EXPECT_GT(errors_of(held.planes, held.variance, view_.camera, 8).median, 0.15);
+  options_.sigmas = RefineOptions().sigmas;
+  const RefinedView refined = refine();
+  const Errors after = errors_of(refined.planes, refined.variance, view_.camera, 8);
+  EXPECT_LT(after.median, 0.01);
+  EXPECT_GT(after.within_two_sigma, 0.8);
+}
+
 TEST_F(RefineView, LightThatDiffersBetweenPhotographsDoesNotMatter) {
   const RefinedView as_it_is = refine();
   for (MatchView& source : sources_)

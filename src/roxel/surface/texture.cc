@@ -158,8 +158,12 @@ class Texturing {
       for (const std::uint32_t f : chart.faces)
         if (chart.view != kNoView)
           for (const std::int32_t n : points_.of_face[f]) chart.box.extend(pixels_[n]);
-    for (out_.scale = 1;; out_.scale *= kShrink)
-      if (try_to_pack()) break;
+    out_.scale = 0;
+    if (!try_to_pack())
+      throw_invalid("--texture-size", std::to_string(options_.largest_side),
+                    "at least " + std::to_string(std::max(size_.width, size_.height)) + ", for " +
+                        std::to_string(charts_.size()) + " charts of a few texels each");
+    for (out_.scale = 1; !try_to_pack(); out_.scale *= kShrink) context_.throw_if_cancelled();
     write_uvs();
   }
 
@@ -179,16 +183,16 @@ class Texturing {
       rect.width = rect.height = kUnseenSide;
       if (charts_[i].view != kNoView) {
         const Vector2d size = out_.scale * charts_[i].box.sizes();
-        rect.width = static_cast<int>(std::ceil(size.x())) + 2 * kPadding + 1;
-        rect.height = static_cast<int>(std::ceil(size.y())) + 2 * kPadding + 1;
+        rect.width = std::max(1, static_cast<int>(std::ceil(size.x()))) + 2 * kPadding + 1;
+        rect.height = std::max(1, static_cast<int>(std::ceil(size.y()))) + 2 * kPadding + 1;
       }
       area += static_cast<double>(rect.width) * rect.height;
       widest = std::max({widest, rect.width, rect.height});
     }
     const int side = std::max(widest, static_cast<int>(std::ceil(std::sqrt(area * 1.02))));
-    if (side > options_.largest_side) return false;
+    if (side > options_.largest_side && out_.scale > 0) return false;
     size_ = pack(side, rects_);
-    return size_.height <= options_.largest_side;
+    return std::max(side, size_.height) <= options_.largest_side;
   }
 
   /// Where the chart's view's pixel lies in the picture.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "roxel/base/error.h"
 #include "roxel/surface/atlas.h"
 #include "roxel/surface/seam_levelling.h"
 #include "roxel/surface/surface_fixture.h"
@@ -115,6 +116,28 @@ TEST(Texture, FitsTheSideThatIsAllowed) {
   EXPECT_LE(std::max(textured.picture.width(), textured.picture.height()), 160);
   EXPECT_LT(textured.scale, 1);
   EXPECT_LT(worst_error(textured), 0.1);
+}
+
+TEST(Texture, ASideThatCannotHoldTheChartsIsAnErrorThatSaysWhatCan) {
+  const Ball ball;
+  TextureOptions options;
+  options.largest_side = 16;
+  const auto least_side = [&]() -> int {
+    try {
+      ball.textured_with(options);
+    } catch (const InvalidInput& e) {
+      const std::string what = e.what(), expected = "expected at least ";
+      EXPECT_NE(what.find("--texture-size"), std::string::npos) << what;
+      const std::size_t at = what.find(expected);
+      if (at != std::string::npos) return std::stoi(what.substr(at + expected.size()));
+    }
+    return 0;
+  };
+  const int least = least_side();
+  ASSERT_GT(least, 16);
+  options.largest_side = least;
+  const TexturedSurface textured = ball.textured_with(options);
+  EXPECT_LE(std::max(textured.picture.width(), textured.picture.height()), least);
 }
 
 TEST(Texture, IsTheSameForAnyNumberOfThreads) {
