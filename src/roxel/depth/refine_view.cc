@@ -21,10 +21,9 @@ constexpr double kModelNoise = 0.02;         ///< share of a patch's variance th
 constexpr double kIndependent = 0.25;        ///< share of a patch's samples that err independently
 constexpr double kIndependentErrors = 0.25;  ///< the same, for how far a depth may be off
 constexpr double kVolumeStretch =
-    1.5;  ///< of the variance that rests on the volume: its errors are alike nearby
-constexpr float kFreedom =
-    4;  ///< of the Student distribution of the volume's errors in units of its deviation
-constexpr float kFirstReach = 6;         ///< deviations that the first random plane may be off
+    1.5;                          ///< of the variance that rests on the volume: its errors are alike nearby
+constexpr float kFreedom = 4;     ///< of the Student distribution of the volume's errors
+constexpr float kFirstReach = 6;  ///< deviations that the first random plane may be off
 constexpr double kSlopeSigma = 0.6;      ///< tangent by which the volume's normals err
 constexpr double kSteepestPlane = 6;     ///< tangent of the steepest plane
 constexpr float kLeastAgreement = 0.4f;  ///< correlation of a view that counts in the least squares

@@ -83,6 +83,18 @@ TEST_F(RefineView, FindsThePlaneThoughTheVolumeIsSureOfAFalseOneInFront) {
   EXPECT_GT(after.within_two_sigma, 0.8);
 }
 
+// Where texture is faint the least squares feel the volume, too, but far from it hardly.
+TEST_F(RefineView, FaintTextureIsNotPulledBackToAFalseSurface) {
+  const double faint = 0.1;
+  view_ = SlantedPlane::view(0, 0, faint, -0.4, 0);
+  sources_.clear();
+  for (const auto& [x, y] : {std::array{0.6, 0.0}, {-0.5, 0.2}, {0.1, -0.6}})
+    sources_.push_back(SlantedPlane::view(x, y, faint, -0.4, 0));
+  start_ = fit_planes(view_.depth, view_.variance, 90, 3);
+  const RefinedView refined = refine();
+  EXPECT_LT(errors_of(refined.planes, refined.variance, view_.camera, 8).median, 0.025);
+}
+
 TEST_F(RefineView, LightThatDiffersBetweenPhotographsDoesNotMatter) {
   const RefinedView as_it_is = refine();
   for (MatchView& source : sources_)
