@@ -140,7 +140,7 @@ class MeshStage {
       const View& view = input_.dataset.views[with_depth_[v]];
       return read_fusion_view(depth_path(input_.depth_run, view.name), view);
     };
-    const DistanceField field = fuse_depth(static_cast<int>(with_depth_.size()), load, fusion, context_);
+    const DistanceField field = fused(load, fusion);
     out_.figures["fused_samples"] = field.sample_count();
     lap("mesh: fusion", 0.15);
     Extraction extraction =
@@ -156,6 +156,14 @@ class MeshStage {
     out_.figures["closing_triangles"] = extraction.closed;
     surface_ = std::move(extraction.surface);
     lap("mesh: extraction", 0.2);
+  }
+
+  DistanceField fused(const FusionViewLoader& load, const FusionOptions& fusion) const {
+    try {
+      return fuse_depth(static_cast<int>(with_depth_.size()), load, fusion, context_);
+    } catch (const InvalidInput& error) {
+      throw InvalidInput((input_.depth_run / "depth").string() + ": " + error.what());
+    }
   }
 
   void simplify() {

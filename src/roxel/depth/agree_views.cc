@@ -24,8 +24,9 @@ constexpr double kBinsPerSigma = 50;     ///< up to 40
 /// What another view says of the inverse depth along a ray.
 struct Opinion {
   double w = 0;
-  double own = 0;     ///< variance that is this view's alone
-  double shared = 0;  ///< and that views have in common
+  double own = 0;        ///< variance that is this view's alone
+  double shared = 0;     ///< and that views have in common
+  bool matched = false;  ///< photographs said something of it
   double total() const { return own + shared; }
 };
 
@@ -47,7 +48,8 @@ std::optional<Opinion> ask(const AgreeingView& other, const Eigen::Vector3d& pix
   if (std::abs(facing) < 0.05) return {};
   const double scale = h.z() / facing;  // d w / d (inverse depth there)
   const double shared = std::min<double>(variance, *other.view->shared.pixel(x, y));
-  const Opinion opinion{p.dot(far) / facing, scale * scale * (variance - shared), scale * scale * shared};
+  const Opinion opinion{p.dot(far) / facing, scale * scale * (variance - shared), scale * scale * shared,
+                        *other.view->correlation.pixel(x, y) > 0};
   if (!(std::abs(opinion.w - w) < kFarthest * w)) return {};
   return opinion;
 }
@@ -113,7 +115,7 @@ class ViewAgreement {
     mine.own *= stretch * stretch;
     double weight = 1 / mine.total(), first = 0, second = 0;
     double shared = weight * mine.shared, own = weight * mine.own;
-    int agreeing = 0;
+    int agreeing = 0, confirming = 0;
     for (const AgreeingView& other : others_) {
       auto opinion = ask(other, {x + 0.5, y + 0.5, 1}, w);
       if (!opinion) continue;
@@ -126,8 +128,9 @@ class ViewAgreement {
       shared += k * opinion->shared;
       own += k * opinion->own;
       ++agreeing;
+      confirming += opinion->matched;
     }
-    *out.views.pixel(x, y) = static_cast<float>(agreeing);
+    *out.views.pixel(x, y) = static_cast<float>(confirming);
     const double mean = first / weight;
     const double chi2 = agreeing > 0 ? std::max(1.0, (second - mean * first) / agreeing) : 1;
     plane.w = static_cast<float>(w + mean);

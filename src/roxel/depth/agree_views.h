@@ -19,7 +19,7 @@ struct AgreeingView {
 struct AgreedView {
   PlaneMap planes;
   Image variance;      ///< of w
-  Image views;         ///< how many others agree
+  Image views;         ///< how many others agree that photographs said something of
   double stretch = 1;  ///< by which deviations were too small, as the views differ
 };
 

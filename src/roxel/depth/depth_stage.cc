@@ -18,9 +18,9 @@ namespace {
 
 constexpr std::size_t kCachedBytes = std::size_t{1} << 30;  ///< of views beside the one that is worked on
 constexpr double kMostVoxels = 0.8;                         ///< of a depth's deviation, as refinement sees it
-constexpr double kUnconfirmed = 1;       ///< voxels that a depth may move by which no other view sees there
-constexpr double kAnotherSurface = 1.5;  ///< times as far as refinement may move: not this pixel's plane
-constexpr int kSampleStride = 8;         ///< at most: pixels between samples that sources are chosen by
+constexpr double kUnconfirmed = 1;     ///< voxels that a depth may move by which no other view sees there
+constexpr double kAnotherSurface = 3;  ///< voxels beyond which a smaller view's pixel saw another surface
+constexpr int kSampleStride = 8;       ///< at most: pixels between samples that sources are chosen by
 
 class Clock {
  public:
@@ -218,21 +218,35 @@ class DepthStage {
     return matching_luma(photo.rgb, scene_.white, photo.valid);
   }
 
-  MatchView match_view(int v) const {
-    const DepthLayers layers = files_.read(v);
-    const Photograph photo = scaled(load_(dataset_.views[v]), scale_);
-    const int width = photo.rgb.width(), height = photo.rgb.height();
-    MatchView view{small_.views[v].camera, matching_luma(photo.rgb, scene_.white, photo.valid),
-                   matching_color(photo.rgb, scene_.white), Image(width, height, 1), Image(width, height, 1)};
+  /// What the volume says of the smaller view's pixels.
+  struct SmallDepth {
+    Image depth, variance;
+  };
+  SmallDepth small_depth(int v, const Image& before, const Image& variance) const {
+    const Intrinsics& k = small_.views[v].camera.intrinsics;
+    SmallDepth small{Image(k.width, k.height, 1), Image(k.width, k.height, 1)};
     const float most = static_cast<float>(kMostVoxels * kMostVoxels * scene_.voxel_size * scene_.voxel_size);
-    const Image before = depth_before(layers), variance = variance_before(layers);
     const std::vector<std::int64_t> surest = surest_pixels(before, variance, scale_);
     for (std::size_t i = 0; i < surest.size(); ++i) {
       if (surest[i] < 0) continue;
-      view.depth.data()[i] = before.data()[surest[i]];
-      view.variance.data()[i] = std::min(variance.data()[surest[i]], most);
+      small.depth.data()[i] = before.data()[surest[i]];
+      small.variance.data()[i] = std::min(variance.data()[surest[i]], most);
     }
-    return view;
+    return small;
+  }
+
+  /// What refinement starts from.
+  PlaneMap first_planes(int v, const Image& depth, const Image& variance) const {
+    const double focal = mean_focal(small_.views[v].camera);
+    return fit_planes(depth, variance, focal, plane_radius(depth, focal, scene_.voxel_size));
+  }
+
+  MatchView match_view(int v) const {
+    const DepthLayers layers = files_.read(v);
+    const Photograph photo = scaled(load_(dataset_.views[v]), scale_);
+    SmallDepth small = small_depth(v, depth_before(layers), variance_before(layers));
+    return {small_.views[v].camera, matching_luma(photo.rgb, scene_.white, photo.valid),
+            matching_color(photo.rgb, scene_.white), std::move(small.depth), std::move(small.variance)};
   }
 
   std::vector<int> refine_one(int v, ViewCache<MatchView>& views, Aside& writing) {
@@ -241,9 +255,7 @@ class DepthStage {
     const auto held = views.get(sources, small_, context_);
     std::vector<const MatchView*> pointers;
     for (const auto& view : held) pointers.push_back(view.get());
-    const double focal = mean_focal(own->camera);
-    const PlaneMap start =
-        fit_planes(own->depth, own->variance, focal, plane_radius(own->depth, focal, scene_.voxel_size));
+    const PlaneMap start = first_planes(v, own->depth, own->variance);
     RefineOptions options;
     options.patch.radius = options_.refine_radius;
     options.patch.noise = options_.refine_noise;
@@ -285,12 +297,13 @@ class DepthStage {
     writing.start([this, v, own, agreed = std::move(agreed)] { write_refined(v, agreed, own->correlation); });
   }
 
-  /// Each pixel's depth on the plane that shows its surface; as it was before, with the variance that it had,
-  /// where there is no such plane.
+  /// Each pixel's depth on the plane that shows its surface; as it was before, with the variance that it had
+  /// and the volume's normal, where there is no such plane.
   void write_refined(int v, const AgreedView& agreed, const Image& correlation) {
     DepthLayers layers = files_.read(v);
     const Image before = depth_before(layers), variance = variance_before(layers);
-    const double reach = kAnotherSurface * options_.refine_sigmas * kMostVoxels * scene_.voxel_size;
+    const SmallDepth small = small_depth(v, before, variance);
+    const PlaneMap first = first_planes(v, small.depth, small.variance);
     const int width = before.width(), height = before.height();
     layers.depth_refined = Image(width, height, 1);
     layers.variance_refined = Image(width, height, 1);
@@ -300,25 +313,44 @@ class DepthStage {
         const float expected = *before.pixel(x, y);
         if (!(expected > 0)) continue;
         ++figures_.refined_pixels;
-        *layers.depth_refined.pixel(x, y) = expected;
-        *layers.variance_refined.pixel(x, y) = *variance.pixel(x, y);
-        const auto [plane, column, row] = plane_of_pixel(agreed.planes, scale_, x, y, expected);
+        float z = expected, spread = *variance.pixel(x, y);
+        PixelPlane plane = plane_of_pixel(first, scale_, x, y, expected).plane;
+        const PlaneOfPixel refined = plane_of_pixel(agreed.planes, scale_, x, y, expected);
+        const int column = refined.column, row = refined.row;
+        if (!refined.plane.empty() && same_surface(first.at(column, row), column, row, x, y, expected)) {
+          const float moved = 1 / refined.plane.w;
+          const bool matched = *correlation.pixel(column, row) > 0;
+          const bool confirmed = *agreed.views.pixel(column, row) > 0;
+          figures_.matched_pixels += matched;
+          figures_.agreed_pixels += confirmed;
+          if (believed(std::abs(moved - expected), matched, confirmed)) {
+            plane = refined.plane;
+            z = moved;
+            spread = *agreed.variance.pixel(column, row) * z * z * z * z;
+          }
+        }
+        *layers.depth_refined.pixel(x, y) = z;
+        *layers.variance_refined.pixel(x, y) = spread;
         if (plane.empty()) continue;
-        const float z = 1 / plane.w;
-        const double moved = std::abs(z - expected);
-        if (scale_ > 1 && moved > reach) continue;
-        const bool matched = *correlation.pixel(column, row) > 0;
-        const bool confirmed = *agreed.views.pixel(column, row) > 0;
-        figures_.matched_pixels += matched;
-        figures_.agreed_pixels += confirmed;
         const Eigen::Vector3d normal = world_normal(dataset_.views[v].camera, plane, x + 0.5, y + 0.5);
         for (int c = 0; c < 3; ++c) layers.normal.pixel(x, y)[c] = static_cast<float>(normal[c]);
-        if (scale_ > 1 && !matched && !confirmed) continue;
-        if (options_.refine_agree && !confirmed && moved > kUnconfirmed * scene_.voxel_size) continue;
-        *layers.depth_refined.pixel(x, y) = z;
-        *layers.variance_refined.pixel(x, y) = *agreed.variance.pixel(column, row) * z * z * z * z;
       }
     files_.write(v, layers);
+  }
+
+  /// Whether the smaller view's pixel started from the surface that pixel (x, y) has at `expected`.
+  bool same_surface(const PixelPlane& start, int column, int row, int x, int y, double expected) const {
+    if (scale_ == 1) return true;
+    const double w = start.w + start.wu * ((x + 0.5) / scale_ - (column + 0.5)) +
+                     start.wv * ((y + 0.5) / scale_ - (row + 0.5));
+    return w > 0 && std::abs(1 / w - expected) < kAnotherSurface * scene_.voxel_size;
+  }
+
+  /// Whether a pixel goes where its plane is, `moved` world units away.
+  bool believed(double moved, bool matched, bool confirmed) const {
+    if (confirmed) return true;
+    if (scale_ > 1 && !matched) return false;
+    return !options_.refine_agree || moved <= kUnconfirmed * scene_.voxel_size;
   }
 
   void report(const char* stage, int steps) {

@@ -11,9 +11,11 @@ namespace roxel::fixture {
 struct SlantedPlane {
   static constexpr double kZ = 4, kX = 0.3, kY = -0.2;
 
-  static PinholeCamera camera(double x, double y) {
+  /// `size`: times as many pixels along each side.
+  static PinholeCamera camera(double x, double y, int size = 1) {
     PinholeCamera camera;
-    camera.intrinsics = {72, 56, 90, 90, 36, 28, 0};
+    const double k = size;
+    camera.intrinsics = {72 * size, 56 * size, 90 * k, 90 * k, 36 * k, 28 * k, 0};
     camera.pose.centre = {x, y, 0};
     return camera;
   }
@@ -29,10 +31,12 @@ struct SlantedPlane {
   static Eigen::Vector3d normal() { return Eigen::Vector3d(kX, kY, -1).normalized(); }
 
   /// `light`: gain of the photograph. Depth is off by `error` plus `ripple` from pixel to pixel.
-  static MatchView view(double x, double y, double light, double error, double ripple) {
-    MatchView out{camera(x, y), Image(72, 56, 1), {}, Image(72, 56, 1), Image(72, 56, 1, 0.0f)};
-    for (int v = 0; v < 56; ++v)
-      for (int u = 0; u < 72; ++u) {
+  static MatchView view(double x, double y, double light, double error, double ripple, int size = 1) {
+    const int width = 72 * size, height = 56 * size;
+    MatchView out{
+        camera(x, y, size), Image(width, height, 1), {}, Image(width, height, 1), Image(width, height, 1)};
+    for (int v = 0; v < height; ++v)
+      for (int u = 0; u < width; ++u) {
         const Ray ray = out.camera.ray(u + 0.5, v + 0.5);
         const double z = depth(ray);
         *out.luma.pixel(u, v) = static_cast<float>(light * texture(ray.origin + z * ray.direction));

@@ -374,7 +374,7 @@ class ViewRefinement {
         linearised = false;
       }
     }
-    if (best.correlation > 0) {
+    if (best.agreeing != 0) {
       if (!patch) patch.emplace(patch_at(x, y));
       if (!linearised) joint = join(*patch, best.plane, best.agreeing, i);
       const std::uint32_t agreeing = best.agreeing;

@@ -34,7 +34,7 @@ struct RefinedView {
   PlaneMap planes;
   Image variance;     ///< of w
   Image shared;       ///< the part of it that other views have in common: the volume's say, and calibration
-  Image correlation;  ///< mean over the views that agree best; 0 = the photographs say nothing
+  Image correlation;  ///< mean over the views that show it best; 0 = none agrees, the photographs say nothing
 };
 
 /// `sources` show what the view shows; where they do is known from their depth. `start`: a plane for each

@@ -69,6 +69,23 @@ TEST(Simplification, TheErrorBoundsIt) {
   };
   EXPECT_GT(count(0.001), count(0.01));
   EXPECT_GT(count(0.01), count(0.1));
+  for (const double error : {0.001, 0.01}) {
+    const Surface fewer = simplified(ball, {std::nullopt, error});
+    const MeshRays rays(fewer.mesh);
+    double square = 0, worst = 0;
+    int hits = 0;
+    for (const Vector3d& x : ball.mesh.points) {
+      const auto hit = rays.trace({0, 0, 0}, x);
+      if (!hit) continue;  // between two sides of the cube that the ball was made of
+      ++hits;
+      const double off = std::abs(1 - hit->distance);
+      square += off * off;
+      worst = std::max(worst, off);
+    }
+    EXPECT_GT(hits, 0.8 * static_cast<double>(ball.mesh.points.size()));
+    EXPECT_LT(std::sqrt(square / hits), error);
+    EXPECT_LT(worst, 2 * error);
+  }
   EXPECT_EQ(simplified(ball, {1000000, 0}).mesh.triangles.size(), ball.mesh.triangles.size());
 }
 
