@@ -463,6 +463,17 @@ class Depth(Case):
         tracks = (there / "sparse/points3D.txt").read_text().splitlines()[1:]
         self.assertTrue(tracks and all(len(line.split()) >= 12 for line in tracks))
 
+    def test_a_disc_that_is_full_leaves_no_half_workspace(self):
+        out, _ = self.reconstruct("full", "--no-render", "--no-report")
+        there = self.folder / "half"
+        largest = 4 * 64 * 48 * 3  # a normal map, but for its head
+        for most_bytes in (5000, largest - 10):
+            with self.subTest(most_bytes):
+                done = run_on_a_full_disc("convert", out, "--to", "colmap-dense", "-o", there, "--quiet", most_bytes=most_bytes)
+                self.assertEqual(done.returncode, 1, done.stderr)
+                self.assertRegex(done.stderr, "half.*(cannot write|writing failed)")
+                self.assertFalse(there.exists())
+
     def test_bad_runs_are_named(self):
         self.expect_error(2, "expected the folder of a finished run", "depth", self.data)
         self.expect_error(2, "a finished run", "convert", self.data, "--to", "colmap-dense", "-o", self.folder / "no")

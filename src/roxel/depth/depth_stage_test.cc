@@ -39,21 +39,21 @@ class DepthStage : public ::testing::Test {
 
   DepthStageFigures run() {
     refined_.resize(layers_.size());
-    const DepthFiles files{[&](int v) { return layers_[v]; },
-                           [&](int v, const DepthLayers& layers) { layers_[v] = layers; },
-                           [&](int v, const RefinedView& view) { refined_[v] = view; },
-                           [&](int v) { return refined_[v]; }};
+    const DepthFiles files{
+        [&](int v) { return layers_[v]; }, [&](int v, const DepthLayers& layers) { layers_[v] = layers; },
+        [&](int v, const RefinedView& view) { refined_[v] = view; }, [&](int v) { return refined_[v]; }};
     RunContext context(1);
     return run_depth_stage(
-        dataset_, [&](const View& view) { return photographs_.at(view.name); }, {1, kStageVoxel}, files, options_,
-        context);
+        dataset_, [&](const View& view) { return photographs_.at(view.name); }, {1, kStageVoxel}, files,
+        options_, context);
   }
 
   /// Median of the first view's errors, away from its border.
   double median_error(const Image& depth) const {
     std::vector<double> errors;
     for (int y = 12; y < depth.height() - 12; ++y)
-      for (int x = 12; x < depth.width() - 12; ++x) errors.push_back(std::abs(*depth.pixel(x, y) - truth(x, y)));
+      for (int x = 12; x < depth.width() - 12; ++x)
+        errors.push_back(std::abs(*depth.pixel(x, y) - truth(x, y)));
     std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
     return errors[errors.size() / 2];
   }
@@ -103,7 +103,7 @@ TEST_F(DepthStage, AMoveThatNoOtherViewConfirmsIsTakenBack) {
     for (float& z : layers_[v].depth.data()) z += by;
     for (float& value : layers_[v].variance.data()) value = variance;
   };
-  off(0, 0.15f, 0.3f * 0.3f);  // the photographs say by how much
+  off(0, 0.15f, 0.3f * 0.3f);                          // the photographs say by how much
   for (const int v : {1, 2, 3}) off(v, 0.3f, 1e-10f);  // and these do not listen
   const Image before = layers_[0].depth;
   run();
