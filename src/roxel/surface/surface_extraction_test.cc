@@ -26,9 +26,11 @@ std::vector<FusionView> ball_with_hole(double angle) {
   return views;
 }
 
-Extraction extracted(const std::vector<FusionView>& views, const ExtractionOptions& options) {
+Extraction extracted(const std::vector<FusionView>& views, const ExtractionOptions& options,
+                     double half_box = 1.5) {
   FusionOptions fusion = fixture::ball_fusion();
   fusion.hole_size = options.hole_size;
+  fusion.box = {Vector3d::Constant(-half_box), Vector3d::Constant(half_box)};
   RunContext context(2);
   return extract_surface(
       fuse_depth(
@@ -92,6 +94,40 @@ TEST(SurfaceExtraction, SmallHolesAreClosedAndLargeOnesStayOpen) {
   EXPECT_GT(closed.closed, 10);
   for (const Vector3d& x : closed.surface.mesh.points) EXPECT_NEAR(x.norm(), 1, 0.12);
   EXPECT_GT(open_edges(extracted(ball_with_hole(0.9), options).surface.mesh), 10);
+}
+
+TEST(SurfaceExtraction, ASmallPartGoesAndTheLargeOneStays) {
+  const Vector3d centre(0, 0, 1.8);  // of a crumb beside the ball, 5 lattice steps across
+  const double radius = 0.2;
+  std::vector<FusionView> views;
+  for (const PinholeCamera& camera : fixture::cameras_around(8, 192, 2.2)) {
+    FusionView view = fixture::ball_view(camera);
+    for (int y = 0; y < view.depth.height(); ++y)
+      for (int x = 0; x < view.depth.width(); ++x)
+        if (const auto t = fixture::meet_ball(camera.ray(x + 0.5, y + 0.5), centre, radius)) {
+          float& depth = *view.depth.pixel(x, y);
+          depth = depth > 0 ? std::min(depth, static_cast<float>(*t)) : static_cast<float>(*t);
+          *view.opacity.pixel(x, y) = 1;
+        }
+    views.push_back(std::move(view));
+  }
+  const auto near_crumb = [&](const Mesh& mesh) {
+    return std::count_if(mesh.points.begin(), mesh.points.end(),
+                         [&](const Vector3d& x) { return (x - centre).norm() < 1.5 * radius; });
+  };
+  ExtractionOptions options;
+  options.smallest_part = 3;
+  const Extraction both = extracted(views, options, 2.2);
+  EXPECT_GT(near_crumb(both.surface.mesh), 30);
+  EXPECT_EQ(both.debris, 0);
+
+  options.smallest_part = 10;
+  const Extraction large = extracted(views, options, 2.2);
+  EXPECT_EQ(near_crumb(large.surface.mesh), 0);
+  EXPECT_GT(large.debris, 30);
+  EXPECT_EQ(large.surface.mesh.triangles.size() + large.debris, both.surface.mesh.triangles.size());
+  EXPECT_EQ(open_edges(large.surface.mesh), 0);
+  EXPECT_GT(large.surface.mesh.triangles.size(), 1000u);
 }
 
 TEST(SurfaceExtraction, WhatOneViewAloneSeesIsLeftOut) {

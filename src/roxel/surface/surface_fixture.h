@@ -12,21 +12,25 @@ namespace roxel::fixture {
 
 inline constexpr double kBallRadius = 1;
 
-/// Cameras at the corners of a cube around the ball, four of them (a tetrahedron) or all eight.
-inline std::vector<PinholeCamera> cameras_around(int count = 8, int size_px = 96) {
+/// Cameras at the corners of a cube around the ball, four of them (a tetrahedron) or all eight; they see what
+/// lies within `seen` of its centre.
+inline std::vector<PinholeCamera> cameras_around(int count = 8, int size_px = 96,
+                                                 double seen = 1.2 * kBallRadius) {
   std::vector<PinholeCamera> cameras;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d direction(i & 1 ? 1 : -1, i & 2 ? 1 : -1, (i & 4 ? 1 : -1) * 0.7);
-    cameras.push_back(orbit_camera(Eigen::Vector3d::Zero(), 1.2 * kBallRadius, direction,
-                                   Eigen::Vector3d::UnitZ(), size_px));
+    cameras.push_back(
+        orbit_camera(Eigen::Vector3d::Zero(), seen, direction, Eigen::Vector3d::UnitZ(), size_px));
   }
   return cameras;
 }
 
-/// Where the ray meets the ball, in units of its direction.
-inline std::optional<double> meet_ball(const Ray& ray) {
-  const double a = ray.direction.squaredNorm(), b = ray.origin.dot(ray.direction),
-               c = ray.origin.squaredNorm() - kBallRadius * kBallRadius;
+/// Where the ray meets the ball (or one elsewhere), in units of its direction.
+inline std::optional<double> meet_ball(const Ray& ray, const Eigen::Vector3d& centre = {0, 0, 0},
+                                       double radius = kBallRadius) {
+  const Eigen::Vector3d from_centre = ray.origin - centre;
+  const double a = ray.direction.squaredNorm(), b = from_centre.dot(ray.direction),
+               c = from_centre.squaredNorm() - radius * radius;
   const double inner = b * b - a * c;
   if (inner < 0) return {};
   return (-b - std::sqrt(inner)) / a;
