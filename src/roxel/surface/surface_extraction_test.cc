@@ -28,9 +28,8 @@ std::vector<FusionView> ball_with_hole(double angle) {
 
 Extraction extracted(const std::vector<FusionView>& views, const ExtractionOptions& options,
                      double half_box = 1.5) {
-  FusionOptions fusion = fixture::ball_fusion();
+  FusionOptions fusion = fixture::ball_fusion(half_box);
   fusion.hole_size = options.hole_size;
-  fusion.box = {Vector3d::Constant(-half_box), Vector3d::Constant(half_box)};
   RunContext context(2);
   return extract_surface(
       fuse_depth(

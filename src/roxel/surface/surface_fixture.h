@@ -50,10 +50,10 @@ inline FusionView ball_view(const PinholeCamera& camera, float variance = 1e-4f)
   return view;
 }
 
-inline FusionOptions ball_fusion() {
+inline FusionOptions ball_fusion(double half_box = 1.5) {
   FusionOptions options;
   options.voxel_size = 0.08;
-  options.box = {Eigen::Vector3d::Constant(-1.5), Eigen::Vector3d::Constant(1.5)};
+  options.box = {Eigen::Vector3d::Constant(-half_box), Eigen::Vector3d::Constant(half_box)};
   return options;
 }
 
