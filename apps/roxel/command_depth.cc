@@ -123,6 +123,9 @@ int run_depth(const Invocation& invocation, const DepthCommandOptions& options) 
       refine_depth_files(input.dataset, input.load, {run.file.info.exposure, voxel_size},
                          {results.path(), run.path}, options.stage, session.context(), begin, 1);
   session.context().throw_if_cancelled();
+  if ((options.stage.bp || options.stage.refine) && figures.propagation.pixels + figures.refined_pixels == 0)
+    throw_invalid((run.path / "depth").string(), "no pixel with depth in any view",
+                  "depth maps of a surface in the run's box");
   const nlohmann::ordered_json summary =
       new_summary(run, figures, depth_option_table().to_json(options.stage));
   if (has_report(run))

@@ -18,6 +18,7 @@
 #include "roxel/io/depth_file.h"
 #include "roxel/io/voxels_ply.h"
 #include "roxel/solve/estimate.h"
+#include "roxel/surface/depth_fusion.h"
 #include "run_checkpoints.h"
 #include "sky_again.h"
 #include "sky_stage.h"
@@ -447,9 +448,22 @@ class Run {
 
   void export_depth(const std::filesystem::path& results) {
     if (!options_.stages.depth || options_.stages.exported == Export::kNone) return;
-    write_dense_workspace(input_.dataset, input_.load, results, results / "colmap", made_.scene.exposure,
-                          made_.scene.voxel_size, session_.context());
+    unless_no_surface("no export", [&] {
+      write_dense_workspace(input_.dataset, input_.load, results, results / "colmap", made_.scene.exposure,
+                            made_.scene.voxel_size, session_.context());
+    });
     add_stage("export");
+  }
+
+  /// Where there is no surface, a run still has its volume: said, not failed.
+  template <class Work>
+  void unless_no_surface(const std::string& what, const Work& work) {
+    try {
+      work();
+    } catch (const NoSurface& error) {
+      made_.summary.notes.push_back(what + ": " + error.what());
+      warn(options_.common, made_.summary.notes.back());
+    }
   }
 
   void add_stage(const char* name) {
@@ -464,19 +478,15 @@ class Run {
     return info;
   }
 
-  /// Where there is no surface to make, a run still has its volume and depth: said, not failed.
   void write_mesh(const std::filesystem::path& results) {
     const MeshInput source{input_.dataset,         input_.load, made_.volume,  volume_info(),
                            made_.scene.bounds.box, results,     kDepthRefined, 0.98};
-    try {
+    unless_no_surface("no mesh", [&] {
       MeshResult mesh = make_mesh(source, options_.mesh, results, session_.context());
       mesh_figures_ = std::move(mesh.figures);
       report_mesh_ = std::move(mesh.pictures);
       for (const std::string& warning : mesh.warnings) warn(options_.common, warning);
-    } catch (const InvalidInput& error) {
-      made_.summary.notes.push_back(std::string("no mesh: ") + error.what());
-      warn(options_.common, made_.summary.notes.back());
-    }
+    });
     add_stage("mesh");
   }
 

@@ -11,6 +11,7 @@
 #include "roxel/io/image_file.h"
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
+#include "roxel/surface/depth_fusion.h"
 
 namespace roxel::cli {
 namespace {
@@ -45,14 +46,13 @@ struct DenseMaps {
 
 DenseMaps dense_maps(const DepthLayers& layers, const PinholeCamera& camera, double voxel_size) {
   DenseMaps maps;
-  maps.depth = !layers.depth_refined.empty() ? layers.depth_refined
-               : !layers.depth_bp.empty()    ? layers.depth_bp
-                                             : believed_depth(layers);
+  DepthEstimates best = best_estimates(layers);
+  maps.depth = std::move(best.depth);
   maps.normal = Image(maps.depth.width(), maps.depth.height(), 3);
   PlaneMap fitted;
   const double focal = 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy);
   if (layers.normal.empty())
-    fitted = fit_planes(maps.depth, layers.variance, focal, plane_radius(maps.depth, focal, voxel_size));
+    fitted = fit_planes(maps.depth, best.variance, focal, plane_radius(maps.depth, focal, voxel_size));
   for (int y = 0; y < maps.depth.height(); ++y)
     for (int x = 0; x < maps.depth.width(); ++x) {
       if (!(*maps.depth.pixel(x, y) > 0)) continue;
@@ -125,8 +125,13 @@ void write_dense_workspace(Dataset dataset, const PhotographLoader& load, const 
     progress.fraction = ++done / static_cast<double>(dataset.views.size());
     context.report(progress);
   });
-  if (!any)
-    throw_invalid((run / "depth").string(), "no pixel with depth in any view", "depth maps of a surface");
+  if (!any) {
+    std::error_code ignored;
+    fs::remove_all(results / "stereo", ignored);
+    fs::remove_all(results / "images", ignored);
+    throw NoSurface((run / "depth").string() +
+                    ": found no pixel with depth in any view, expected depth maps of a surface");
+  }
   write_colmap_workspace(dataset, shared_points(dataset, thin), results);
 }
 

@@ -75,13 +75,20 @@ DepthLayers read_layers(const DepthFolders& folders, const View& view) {
   return layers;
 }
 
+/// That of the rays, at least one half where there is a depth that is believed.
+Image opacity_of(const DepthLayers& layers, const Image& depth) {
+  Image opacity = layers.opacity;
+  for (std::size_t i = 0; i < opacity.data().size(); ++i)
+    if (depth.data()[i] > 0) opacity.data()[i] = std::max(opacity.data()[i], 0.5f);
+  return opacity;
+}
+
 /// The best that is known of the depth.
 void write_picture(const fs::path& results, const View& view, const DepthLayers& layers) {
-  const Image& depth = !layers.depth_refined.empty() ? layers.depth_refined
-                       : !layers.depth_bp.empty()    ? layers.depth_bp
-                                                     : layers.depth;
+  const Image depth = best_estimates(layers).depth;
+  const Image shown = opacity_of(layers, depth);
   write_png(view_path(results, "depth", view.name, ".png").string(),
-            depth_picture(depth, layers.opacity, shown_depths(depth, layers.opacity)), kAsItIs);
+            depth_picture(depth, shown, shown_depths(depth, shown)), kAsItIs);
 }
 
 /// Unit vectors as colours: -1 to 1 as black to full.
@@ -145,6 +152,9 @@ ordered_json to_json(const DepthStageFigures& figures) {
         {"mean_variance_after", mean(bp.variance_after, bp.pixels)},
         {"mean_prior_sigma", bp.prior_sigma / bp.views},
         {"sweeps", bp.sweeps},
+        {"views", bp.views},
+        {"converged_views", bp.converged},
+        {"largest_movement_sigmas", bp.movement},
         {"propagation_seconds_per_megapixel", figures.pixels > 0 ? 1e6 * bp.seconds / figures.pixels : 0}};
   if (figures.refine_seconds > 0)
     json["refined"] = {
@@ -183,9 +193,11 @@ std::string brief(const DepthStageFigures& figures) {
   std::string text;
   const PropagationFigures& bp = figures.propagation;
   if (bp.views > 0)
-    text += formatted("belief propagation: mean variance of depth %.4g before, %.4g after; %.1f s\n",
-                      mean(bp.variance_before, bp.pixels), mean(bp.variance_after, bp.pixels),
-                      figures.propagate_seconds);
+    text += formatted(
+        "belief propagation: mean variance of depth %.4g before, %.4g after; %d of %d views converged "
+        "(the last sweep moved a depth by at most %.2g of its deviation); %.1f s\n",
+        mean(bp.variance_before, bp.pixels), mean(bp.variance_after, bp.pixels), bp.converged, bp.views,
+        bp.movement, figures.propagate_seconds);
   if (figures.refine_seconds > 0)
     text += formatted("refinement: of %lld pixels with depth, %.1f %% matched, %.1f %% agreed on; %.1f s\n",
                       static_cast<long long>(figures.refined_pixels),

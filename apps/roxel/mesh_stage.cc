@@ -35,32 +35,16 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-/// What the run's depth file says of a view: the refined depth where there is some.
+/// What the run's depth file says of a view.
 FusionView read_fusion_view(const fs::path& file, const View& view) {
-  const std::vector<FloatChannel> channels = read_exr_channels(file.string());
-  const auto channel = [&](const char* name) -> Image {
-    const Image* found = find_channel(channels, name);
-    return found ? *found : Image();
-  };
-  FusionView out{view.camera, channel("Z.refined"), channel("V.refined"), channel("A"), {}};
-  if (out.depth.empty() || out.variance.empty()) {
-    out.depth = channel("Z");
-    out.variance = channel("V");
-  }
-  if (out.depth.empty() || out.variance.empty() || out.opacity.empty())
-    throw_invalid(file.string(), "no channels Z, V and A", "a depth map of roxel");
+  DepthLayers layers = read_depth(file);
   const Intrinsics& k = view.camera.intrinsics;
-  if (out.depth.width() != k.width || out.depth.height() != k.height)
-    throw_invalid(file.string(), size_text(out.depth.width(), out.depth.height()) + " pixels",
+  if (layers.depth.width() != k.width || layers.depth.height() != k.height)
+    throw_invalid(file.string(), size_text(layers.depth.width(), layers.depth.height()) + " pixels",
                   size_text(k.width, k.height) + " as " + view.source + " has");
-  for (std::size_t i = 0; i < out.depth.data().size(); ++i)
-    if (!(out.opacity.data()[i] > kHasDepth)) out.depth.data()[i] = 0;
-  const Image normals[3] = {channel("N.x"), channel("N.y"), channel("N.z")};
-  if (normals[0].empty() || normals[1].empty() || normals[2].empty()) return out;
-  out.normal = Image(k.width, k.height, 3);
-  for (std::size_t i = 0; i < out.normal.data().size(); ++i)
-    out.normal.data()[i] = normals[i % 3].data()[i / 3];
-  return out;
+  DepthEstimates best = best_estimates(layers);
+  return {view.camera, std::move(best.depth), std::move(best.variance), std::move(layers.opacity),
+          std::move(layers.normal)};
 }
 
 /// The whole job, step by step.
@@ -146,10 +130,10 @@ class MeshStage {
     Extraction extraction =
         extract_surface(field, {options_.min_views, options_.hole_size, options_.smallest_part});
     if (extraction.surface.mesh.triangles.empty())
-      throw_invalid(input_.depth_run.string(),
-                    "no surface that " + std::to_string(options_.min_views) +
-                        " views agree on and that is large enough",
-                    "--min-views 1, a smaller --smallest-part, or better depth maps");
+      throw NoSurface(input_.depth_run.string() + ": found no surface that " +
+                      std::to_string(options_.min_views) +
+                      " views agree on and that is large enough, expected --min-views 1, a smaller "
+                      "--smallest-part, or better depth maps");
     out_.figures["extracted_triangles"] = extraction.surface.mesh.triangles.size();
     out_.figures["unsupported_triangles"] = extraction.unsupported;
     out_.figures["debris_triangles"] = extraction.debris;
@@ -161,10 +145,14 @@ class MeshStage {
   DistanceField fused(const FusionViewLoader& load, const FusionOptions& fusion) const {
     try {
       return fuse_depth(static_cast<int>(with_depth_.size()), load, fusion, context_);
+    } catch (const NoSurface& error) {
+      throw NoSurface(depth_folder() + ": " + error.what());
     } catch (const InvalidInput& error) {
-      throw InvalidInput((input_.depth_run / "depth").string() + ": " + error.what());
+      throw InvalidInput(depth_folder() + ": " + error.what());
     }
   }
+
+  std::string depth_folder() const { return (input_.depth_run / "depth").string(); }
 
   void simplify() {
     const auto extracted = std::ssize(surface_.mesh.triangles);

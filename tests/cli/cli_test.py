@@ -12,6 +12,7 @@ import re
 import resource
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -473,6 +474,51 @@ class Depth(Case):
                 self.assertEqual(done.returncode, 1, done.stderr)
                 self.assertRegex(done.stderr, "half.*(cannot write|writing failed)")
                 self.assertFalse(there.exists())
+
+    def test_a_box_that_nothing_is_in_has_no_depth(self):
+        empty = ["--bounds=-1.5,-1.5,1.4,-1.2,-1.2,1.8", "--no-report", "--export", "colmap"]
+        out, summary = self.reconstruct("nothing", *empty)
+        self.assertTrue(any(note.startswith("no export: ") for note in summary["notes"]), summary["notes"])
+        self.assertFalse((out / "colmap/images").exists() or (out / "colmap/stereo").exists())
+        voxels = self.folder / "voxels-alone"
+        finer = ["--resolution", "24", "--levels", "1", "--passes", "2", "--no-mesh", "--quiet"]
+        self.succeed("reconstruct", self.data, "-o", voxels, *finer, *empty)
+        there = self.folder / "of-nothing"
+        table = [("volume.vdb: found no voxels", out, ["depth", out]),
+                 ("no view has depth in the box", out, ["mesh", out]),
+                 ("no pixel with depth in any view", out, ["convert", out, "--to", "colmap-dense", "-o", there]),
+                 ("no pixel with depth in any view", voxels, ["depth", voxels]),
+                 ("no pixel with depth in any view", voxels, ["depth", voxels, "--from-volume", "--no-bp"])]
+        for message, folder, command in table:
+            with self.subTest(command):
+                before = digests(folder)
+                self.expect_error(2, message, *command, "--quiet")
+                self.assertEqual(digests(folder), before)
+        self.assertFalse(there.exists())
+
+    @unittest.skipIf(os.geteuid() == 0, "root may write anywhere")
+    def test_folders_that_cannot_be_written_to_are_named(self):
+        out, _ = self.reconstruct("locked", "--no-render", "--no-report")
+        out.chmod(0o555)
+        self.addCleanup(out.chmod, 0o755)
+        self.expect_error(1, "locked: cannot be written to", "depth", out, "--quiet")
+
+    def test_places_that_cannot_be_made_are_named(self):
+        out, _ = self.reconstruct("placed", "--no-render", "--no-report")
+        self.expect_error(1, "cannot be made", "convert", out, "--to", "colmap-dense", "-o", "/proc/roxel", "--quiet")
+        (self.folder / "a-file").write_text("x")
+        self.expect_error(2, "a file", "convert", out, "--to", "colmap-dense", "-o", self.folder / "a-file", "--quiet")
+
+    def test_filling_keeps_to_what_masks_call_foreground(self):
+        plain, _ = self.reconstruct("unfilled", "--no-refine", "--no-report", "--export", "colmap")
+        filled, _ = self.reconstruct("filled", "--no-refine", "--no-report", "--export", "colmap", "--bp-fill")
+        count = {}
+        for out in (plain, filled):
+            data = (out / "colmap/stereo/depth_maps/000.png.geometric.bin").read_bytes()
+            values = struct.unpack(f"<{64 * 48}f", data[-4 * 64 * 48:])
+            count[out] = sum(z > 0 for z in values)
+        self.assertGreater(count[filled], count[plain])
+        self.assertLess(count[filled], 0.6 * 64 * 48, "the sky has no depth")
 
     def test_bad_runs_are_named(self):
         self.expect_error(2, "expected the folder of a finished run", "depth", self.data)

@@ -119,6 +119,31 @@ class Mesh(Case):
                 self.assertRegex(full.stderr, "mesh.*(cannot write|writing failed)")
         self.assertEqual({f: digest(self.run_folder / f) for f in files_below(self.run_folder)}, before)
 
+    def test_reconstruct_refuses_what_no_mesh_can_be_made_with(self):
+        again = self.folder / "refused"
+        shutil.copytree(self.run_folder, again)
+        before = {f: digest(again / f) for f in files_below(again)}
+        table = [("--faces: ", ["--faces", "4"]), ("--mesh-voxel-size: ", ["--mesh-voxel-size", "0.0005"])]
+        for message, arguments in table:
+            with self.subTest(message):
+                self.expect_error(2, message, "reconstruct", self.photographs, "-o", again, *SMALL, *arguments, "--quiet")
+                self.assertEqual({f: digest(again / f) for f in before}, before)
+        self.succeed("reconstruct", self.photographs, "-o", again, *SMALL, "--faces", "600", "--resume", "--quiet")
+        summary = json.loads((again / "summary.json").read_text())
+        self.assertTrue(any(note.startswith("resumed after") for note in summary["notes"]), summary["notes"])
+        self.assertLessEqual(summary["mesh"]["triangles"], 600)
+
+    def test_a_run_whose_views_agree_on_nothing_says_so_and_has_the_rest(self):
+        out = self.folder / "none"
+        said = self.succeed("reconstruct", self.photographs, "-o", out, *SMALL, "--min-views", "50").stderr
+        self.assertIn("no mesh: ", said)
+        self.assertIn("no surface that 50 views agree on", said)
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertIsNone(summary["mesh"])
+        self.assertTrue(any("no surface that 50 views agree on" in note for note in summary["notes"]))
+        self.assertEqual([f for f in files_below(out) if f.startswith("mesh")], [])
+        self.assertTrue((out / "volume.vdb").is_file() and (out / "depth/000.exr").is_file())
+
     def test_a_run_without_depth_has_no_mesh(self):
         bare = self.folder / "bare"
         self.succeed("reconstruct", self.photographs, "-o", bare, *SMALL, "--no-depth", "--quiet")

@@ -17,4 +17,15 @@ struct DepthLayers {
   Image normal = {};  ///< N.x, N.y, N.z: 3 channels, unit vectors in the world towards the camera; 0 = none
 };
 
+/// One estimate of a view's depth: world units along the optical axis, 0 = none, and its variance.
+struct DepthEstimates {
+  Image depth, variance;
+};
+
+/// The volume's, where its rays are more opaque than one half; 0 elsewhere.
+Image believed_depth(const DepthLayers& layers);
+
+/// The best that the layers hold: refined, else after belief propagation, else what is believed of Z.
+DepthEstimates best_estimates(const DepthLayers& layers);
+
 }  // namespace roxel

@@ -146,8 +146,10 @@ class DepthStage {
     parallel_for(count_, context_.thread_count(), [&](std::int64_t v, int) {
       context_.throw_if_cancelled();
       DepthLayers layers = files_.read(static_cast<int>(v));
-      const Image luma = luma_of(static_cast<int>(v));
-      const PropagationGuide guide{luma, mean_focal(dataset_.views[v].camera), scene_.voxel_size};
+      const Photograph photo = load_(dataset_.views[v]);
+      const Image luma = matching_luma(photo.rgb, scene_.white, photo.valid);
+      const PropagationGuide guide{luma, mean_focal(dataset_.views[v].camera), scene_.voxel_size,
+                                   surface_pixels(photo, layers.opacity)};
       PropagateDepthOptions options;
       options.prior = options_.bp_prior;
       options.prior_sigma = options_.bp_sigma;
@@ -213,9 +215,16 @@ class DepthStage {
     return variance;
   }
 
-  Image luma_of(int v) const {
-    const Photograph photo = load_(dataset_.views[v]);
-    return matching_luma(photo.rgb, scene_.white, photo.valid);
+  /// 1 where a photograph is valid and shows a surface: as its mask says, or else the volume.
+  static Image surface_pixels(const Photograph& photo, const Image& opacity) {
+    Image pixels(opacity.width(), opacity.height(), 1);
+    for (std::size_t i = 0; i < pixels.data().size(); ++i) {
+      const bool valid = photo.valid.empty() || photo.valid.data()[i] > 0;
+      const bool surface =
+          photo.foreground.empty() ? opacity.data()[i] >= kEmptyRay : photo.foreground.data()[i] >= 0.5f;
+      pixels.data()[i] = valid && surface ? 1.0f : 0.0f;
+    }
+    return pixels;
   }
 
   /// What the volume says of the smaller view's pixels.
@@ -400,7 +409,8 @@ OptionTable<DepthStageOptions> make_table() {
            {{"synchronous", MessageSchedule::kSynchronous}, {"residual", MessageSchedule::kResidual}})
       .help("Order of messages: all at once, or always those that change most");
   table.add("bp-sweeps", &Options::bp_sweeps).help("Most messages a pixel sends").range(1, 100000);
-  table.add("bp-fill", &Options::bp_fill).help("Give depth to pixels without, from their neighbours");
+  table.add("bp-fill", &Options::bp_fill)
+      .help("Give depth from their neighbours to pixels without that masks and volume do not call empty");
   table.add("refine", &Options::refine).help("Move depths to where the photographs agree best");
   table.add("refine-scale", &Options::refine_scale)
       .help("Side of the squares of pixels that refinement sees as one")

@@ -48,6 +48,13 @@ class LatticeBuilder {
   }
   double sigma() const { return sigma_; }
 
+  /// Whether a pixel has depth or may be given some.
+  bool takes_part(std::size_t i) const {
+    if (depth_.data()[i] > 0) return true;
+    if (!options_.fill) return false;
+    return guide_.fillable.empty() ? layers_.opacity.data()[i] >= kEmptyRay : guide_.fillable.data()[i] > 0;
+  }
+
  private:
   bool aware() const { return options_.prior == DepthPrior::kEdgeAware; }
   static float step(const std::vector<float>& steps, std::size_t i) { return steps.empty() ? 0 : steps[i]; }
@@ -110,7 +117,7 @@ class LatticeBuilder {
   float tie(std::size_t a, std::size_t b, float expected) const {
     const float za = depth_.data()[a], zb = depth_.data()[b];
     const bool both = za > 0 && zb > 0;
-    if (!both && !options_.fill) return 0;
+    if (!takes_part(a) || !takes_part(b)) return 0;
     const float precision = static_cast<float>(1 / (sigma_ * sigma_));
     if (!aware()) return precision;
     const float la = guide_.luma.data()[a], lb = guide_.luma.data()[b];
@@ -145,16 +152,9 @@ void PropagationFigures::add(const PropagationFigures& other) {
   prior_sigma += other.prior_sigma;
   views += other.views;
   sweeps = std::max(sweeps, other.sweeps);
+  converged += other.converged;
+  movement = std::max(movement, other.movement);
   seconds += other.seconds;
-}
-
-Image believed_depth(const DepthLayers& layers) {
-  Image depth = layers.depth;
-  for (std::size_t i = 0; i < depth.data().size(); ++i) {
-    float& z = depth.data()[i];
-    if (!(layers.opacity.data()[i] > 0.5f) || !(z > 0) || !std::isfinite(z)) z = 0;
-  }
-  return depth;
 }
 
 int plane_radius(const Image& depth, double focal_px, double voxel_size) {
@@ -180,11 +180,13 @@ PropagationFigures propagate_depth(DepthLayers& layers, const PropagationGuide& 
   figures.views = 1;
   figures.prior_sigma = builder.sigma();
   figures.sweeps = beliefs.sweeps;
+  figures.movement = beliefs.movement;
+  figures.converged = beliefs.movement <= options.propagation.tolerance;
   layers.depth_bp = Image(field.width, field.height, 1);
   layers.variance_bp = Image(field.width, field.height, 1);
   for (std::size_t i = 0; i < field.mean.size(); ++i) {
     const bool had = field.precision[i] > 0;
-    if (!(beliefs.precision[i] > 0) || !(beliefs.mean[i] > 0) || (!had && !options.fill)) continue;
+    if (!(beliefs.precision[i] > 0) || !(beliefs.mean[i] > 0) || !builder.takes_part(i)) continue;
     layers.depth_bp.data()[i] = beliefs.mean[i];
     const float variance = 1 / beliefs.precision[i];
     layers.variance_bp.data()[i] = had ? std::min(variance, layers.variance.data()[i]) : variance;

@@ -19,7 +19,7 @@ enum class DepthPrior {
 struct PropagateDepthOptions {
   DepthPrior prior = DepthPrior::kEdgeAware;
   std::optional<double> prior_sigma;  ///< deviation between neighbours, world units; none: from the data
-  bool fill = false;                  ///< give depth to pixels without, where beliefs reach them
+  bool fill = false;                  ///< give depth to pixels without, see PropagationGuide::fillable
   PropagationOptions propagation;
 };
 
@@ -30,7 +30,9 @@ struct PropagationFigures {
   double variance_before = 0, variance_after = 0;  ///< summed over `pixels`
   double prior_sigma = 0;                          ///< summed over views
   int views = 0;
-  int sweeps = 0;  ///< the most of any view
+  int sweeps = 0;       ///< the most of any view
+  int converged = 0;    ///< views whose beliefs no longer move
+  double movement = 0;  ///< the largest of a belief in a view's last sweep, in its deviations
   double seconds = 0;
   void add(const PropagationFigures& other);
 };
@@ -40,7 +42,13 @@ struct PropagationGuide {
   const Image& luma;  ///< matching_luma of the photograph
   double focal_px = 1;
   double voxel_size = 1;
+  /// Not 0 where `fill` may give depth, such as what masks call foreground; empty: where rays are no less
+  /// opaque than kEmptyRay.
+  Image fillable = {};
 };
+
+/// Rays of less opacity end behind the volume.
+inline constexpr float kEmptyRay = 0.05f;
 
 /// Fills depth_bp and variance_bp. Pixels less opaque than one half count as without depth.
 PropagationFigures propagate_depth(DepthLayers& layers, const PropagationGuide& guide,
@@ -49,8 +57,5 @@ PropagationFigures propagate_depth(DepthLayers& layers, const PropagationGuide& 
 /// Radius, in pixels, of the neighbourhood that planes are fitted to: the volume's depth is rough on the
 /// scale of a voxel.
 int plane_radius(const Image& depth, double focal_px, double voxel_size);
-
-/// Depths of pixels that are more opaque than one half; 0 elsewhere.
-Image believed_depth(const DepthLayers& layers);
 
 }  // namespace roxel

@@ -49,6 +49,19 @@ TEST_F(PropagateDepth, NeighboursTakeNoiseAway) {
   EXPECT_LT(figures.variance_after, 0.5 * figures.variance_before);
 }
 
+TEST_F(PropagateDepth, SaysWhetherBeliefsStillMove) {
+  DepthLayers few = step_scene(kSide, 0.05), many = few;
+  options_.propagation.sweeps = 5;
+  const PropagationFigures moving = run(few);
+  EXPECT_EQ(moving.converged, 0);
+  EXPECT_GT(moving.movement, options_.propagation.tolerance);
+  options_.propagation.sweeps = 2000;
+  const PropagationFigures still = run(many);
+  EXPECT_EQ(still.converged, 1);
+  EXPECT_LT(still.sweeps, 2000);
+  EXPECT_LE(still.movement, options_.propagation.tolerance);
+}
+
 TEST_F(PropagateDepth, GapsInDepthAreKeptUnlessThePriorIsPlain) {
   DepthLayers aware = step_scene(24, 0.01), plain = aware;
   run(aware);
@@ -89,6 +102,23 @@ TEST_F(PropagateDepth, PixelsWithoutDepthAreFilledOnlyWhereAsked) {
   EXPECT_EQ(run(layers).filled, 6);
   EXPECT_NEAR(*layers.depth_bp.pixel(22, 20), true_depth(22, kSide), 0.05);
   EXPECT_GT(*layers.variance_bp.pixel(22, 20), *layers.variance_bp.pixel(22, 24));
+}
+
+TEST_F(PropagateDepth, NoDepthIsInventedWhereMasksOrTheVolumeCallARayEmpty) {
+  options_.prior_sigma = 0.05;
+  options_.fill = true;
+  DepthLayers layers = step_scene(kSide, 0.01);
+  Image fillable(kSide, kSide, 1, 1.0f);
+  for (int x = 20; x < 25; ++x) *layers.opacity.pixel(x, 20) = 0.3f;
+  *fillable.pixel(22, 20) = 0;
+  *layers.opacity.pixel(23, 20) = 0.01f;
+  DepthLayers unmasked = layers;
+  EXPECT_EQ(propagate_depth(layers, {luma_, 50, 0.05, fillable}, options_, [] {}).filled, 4);
+  EXPECT_EQ(*layers.depth_bp.pixel(22, 20), 0);
+  EXPECT_NEAR(*layers.depth_bp.pixel(23, 20), true_depth(23, kSide), 0.05);
+  EXPECT_EQ(run(unmasked).filled, 4);
+  EXPECT_EQ(*unmasked.depth_bp.pixel(23, 20), 0);
+  EXPECT_NEAR(*unmasked.depth_bp.pixel(22, 20), true_depth(22, kSide), 0.05);
 }
 
 TEST_F(PropagateDepth, ThePriorsDeviationIsFoundInTheData) {

@@ -267,7 +267,7 @@ class Fusion {
                    });
       for (const MaskTree::Ptr& mask : of_view) places.topologyUnion(*mask);
     });
-    if (places.empty()) throw InvalidInput("no view has depth in the box: there is no surface to make");
+    if (places.empty()) throw NoSurface("no view has depth in the box: there is no surface to make");
     openvdb::tools::dilateActiveValues(
         places, static_cast<int>(std::ceil(options_.band)), openvdb::tools::NN_FACE_EDGE_VERTEX,
         openvdb::tools::IGNORE_TILES);  // others would make tiles of full leaves

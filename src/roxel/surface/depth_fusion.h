@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "roxel/base/error.h"
 #include "roxel/base/run_context.h"
 #include "roxel/camera/camera.h"
 #include "roxel/image/image.h"
@@ -25,6 +26,12 @@ struct FusionView {
 
 /// The view of that number, from any thread; called twice for every view.
 using FusionViewLoader = std::function<FusionView(int view_idx)>;
+
+/// What is read is sound, yet there is no surface in it.
+class NoSurface : public InvalidInput {
+ public:
+  using InvalidInput::InvalidInput;
+};
 
 struct FusionOptions {
   double voxel_size = 0;      ///< of the distance's lattice, world units
@@ -68,9 +75,9 @@ class DistanceField {
   std::unique_ptr<Voxels> voxels_;
 };
 
-/// Views are loaded a few at a time. The same bit for bit for any number of threads. Throws InvalidInput
-/// where no view has depth in the box, and where the lattice would take more than options.most_bytes;
-/// Cancelled.
+/// Views are loaded a few at a time. The same bit for bit for any number of threads. Throws NoSurface
+/// where no view has depth in the box, InvalidInput where the lattice would take more than
+/// options.most_bytes; Cancelled.
 DistanceField fuse_depth(int view_count, const FusionViewLoader& load, const FusionOptions& options,
                          RunContext& context);
 
