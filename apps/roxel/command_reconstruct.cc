@@ -479,8 +479,15 @@ class Run {
   }
 
   void write_mesh(const std::filesystem::path& results) {
-    const MeshInput source{input_.dataset,         input_.load, made_.volume,  volume_info(),
-                           made_.scene.bounds.box, results,     kDepthRefined, 0.98};
+    const MeshInput source{input_.dataset,
+                           input_.load,
+                           made_.volume,
+                           volume_info(),
+                           made_.scene.bounds.box,
+                           results,
+                           options_.reconstruct.memory,
+                           kDepthRefined,
+                           0.98};
     unless_no_surface("no mesh", [&] {
       MeshResult mesh = make_mesh(source, options_.mesh, results, session_.context());
       mesh_figures_ = std::move(mesh.figures);

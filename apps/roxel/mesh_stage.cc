@@ -14,6 +14,7 @@
 #include "roxel/io/textured_file.h"
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
+#include "roxel/solve/memory_plan.h"
 #include "roxel/solve/summary.h"
 #include "roxel/surface/depth_fusion.h"
 #include "roxel/surface/mesh_picture.h"
@@ -120,6 +121,7 @@ class MeshStage {
     fusion.band = options_.band;
     fusion.hole_size = options_.hole_size;
     fusion.smooth = options_.smooth;
+    fusion.most_bytes = bytes_left();
     const FusionViewLoader load = [&](int v) {
       const View& view = input_.dataset.views[with_depth_[v]];
       return read_fusion_view(depth_path(input_.depth_run, view.name), view);
@@ -150,6 +152,13 @@ class MeshStage {
     } catch (const InvalidInput& error) {
       throw InvalidInput(depth_folder() + ": " + error.what());
     }
+  }
+
+  /// For the lattice.
+  std::int64_t bytes_left() const {
+    double left = memory_at_hand();
+    if (input_.memory) left = std::min(left, *input_.memory * (std::int64_t{1} << 30) - resident_bytes());
+    return static_cast<std::int64_t>(std::max(0.0, std::min(left, 1e15)));
   }
 
   std::string depth_folder() const { return (input_.depth_run / "depth").string(); }

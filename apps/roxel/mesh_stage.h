@@ -41,6 +41,7 @@ struct MeshInput {
   VolumeInfo info;
   Eigen::AlignedBox3d box;
   std::filesystem::path depth_run;  ///< depth/NAME.exr are below it
+  std::optional<double> memory;     ///< GiB that the process may hold; none: what the machine has at hand
   double progress_begin = 0;        ///< fractions of the whole command
   double progress_end = 1;
 };

@@ -4,6 +4,7 @@
     mesh_test.py ROXEL [unittest arguments]
 """
 
+import collections
 import json
 import shutil
 import struct
@@ -43,6 +44,17 @@ def bounds_of(ply):
     return count["vertex"], count["face"], [(min(a), max(a)) for a in zip(*points)]
 
 
+def directed_edges(ply):
+    """Of a mesh.ply: how often each edge is run through from one point to another."""
+    points, triangles, _ = bounds_of(ply)
+    _, _, rows = ply.read_bytes().partition(b"end_header\n")
+    edges = collections.Counter()
+    for corners in struct.iter_unpack("<B3i", rows[27 * points : 27 * points + 13 * triangles]):
+        a, b, c = corners[1:]
+        edges.update([(a, b), (b, c), (c, a)])
+    return edges
+
+
 class Mesh(Case):
     @classmethod
     def setUpClass(cls):
@@ -72,6 +84,12 @@ class Mesh(Case):
         for stage in mesh["stages"] + self.summary["stages"]:
             self.assertGreater(stage["peak_memory_bytes"], 1e6)
         self.assertIn("mesh", [stage["name"] for stage in self.summary["stages"]])
+
+    def test_no_edge_has_more_than_two_triangles(self):
+        for folder in (self.run_folder, self.mesh("whole", "--mesh-error", "0", "--texture", "none")):
+            edges = directed_edges(folder / "mesh.ply")
+            self.assertEqual(max(edges.values()), 1)
+            self.assertGreater(sum((b, a) in edges for a, b in edges), 0.9 * len(edges))
 
     def test_the_command_does_what_the_stage_does(self):
         again = self.mesh("again", "--threads", 1)

@@ -1,5 +1,7 @@
 #include "roxel/solve/memory_plan.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <fstream>
 #include <string>
@@ -68,6 +70,12 @@ double left_in_groups() {
 }
 
 }  // namespace
+
+double resident_bytes() {
+  std::ifstream in("/proc/self/statm");
+  double all = 0, resident = 0;
+  return in >> all >> resident ? resident * static_cast<double>(sysconf(_SC_PAGESIZE)) : 0;
+}
 
 double memory_at_hand() { return std::min(available_on_machine(), left_in_groups()); }
 

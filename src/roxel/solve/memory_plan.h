@@ -21,4 +21,7 @@ struct MemoryPlan {
 /// in. A large number where neither is known.
 double memory_at_hand();
 
+/// Resident memory of this process now, in bytes; 0 where the system does not say.
+double resident_bytes();
+
 }  // namespace roxel

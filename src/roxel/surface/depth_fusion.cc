@@ -25,7 +25,7 @@ constexpr float kSupport = 2.5f;  ///< steps from its surface within which a vie
 constexpr float kLeastSupportCosine =
     0.5f;                               ///< views that see a surface at a flatter angle support less of it
 constexpr double kFarthestOutline = 4;  ///< pixels
-constexpr std::size_t kBytesPerLeaf = 7 * (Leaf::SIZE * sizeof(float) + 128);  ///< with the sums of a vote
+constexpr std::int64_t kBytesPerLeaf = 7 * (Leaf::SIZE * sizeof(float) + 128);  ///< with the sums of a vote
 
 /// A view ready to be asked: per pixel distance along the axis, weight, and the cosine that turns a distance
 /// along the axis into one along the normal.
@@ -226,7 +226,7 @@ class Fusion {
     find_places();
     gather_votes();
     smooth_distance(*voxels_, options_.smooth, context_.thread_count());
-    fill_unseen(*voxels_, options_.hole_size, context_.thread_count());
+    fill_unseen(*voxels_, options_.hole_size, options_.most_bytes, context_.thread_count());
     return DistanceField(std::move(voxels_));
   }
 
@@ -293,12 +293,8 @@ class Fusion {
 
   void check_size(const MaskTree& places) const {
     const std::int64_t leaves = static_cast<std::int64_t>(places.leafCount());
-    const std::int64_t bytes = leaves * static_cast<std::int64_t>(kBytesPerLeaf);
-    if (bytes <= options_.most_bytes) return;
-    throw InvalidInput("the surface's lattice of voxels of " + std::to_string(options_.voxel_size) +
-                       " would take " + std::to_string(bytes >> 20) + " MiB: found more than " +
-                       std::to_string(options_.most_bytes >> 20) +
-                       " MiB, expected larger voxels or less to fuse");
+    const std::int64_t later = lattice_bytes(leaves, static_cast<std::int64_t>(places.activeVoxelCount()));
+    check_lattice_bytes(std::max(leaves * kBytesPerLeaf, later), options_.most_bytes, options_.voxel_size);
   }
 
   void gather_votes() {

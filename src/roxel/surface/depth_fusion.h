@@ -41,7 +41,8 @@ struct FusionOptions {
   float free_opacity = 0.1f;  ///< rays without depth and of less opacity than that see nothing in the box
   double smooth = 0.3;        ///< pull of neighbours, see smooth_distance; 0 = none
   double hole_size = 12;  ///< how far apart seen edges may be that distances are carried on between, voxels
-  std::int64_t most_bytes = std::int64_t{8} << 30;  ///< InvalidInput where the lattice would take more
+  /// InvalidInput where the lattice, and what is made from it, would take more.
+  std::int64_t most_bytes = std::int64_t{8} << 30;
 };
 
 /// A distance at the corners of a lattice, in a narrow band around the surfaces that views see.

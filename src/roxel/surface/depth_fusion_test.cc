@@ -126,6 +126,19 @@ TEST(DepthFusion, NoDepthAndTooMuchOfItAreErrors) {
   }
 }
 
+TEST(DepthFusion, WhatHolesNeedCountsAsMemoryToo) {
+  const auto least = [](double hole_size) {
+    FusionOptions options = wall_options();
+    options.hole_size = hole_size;
+    for (options.most_bytes = 1 << 16;; options.most_bytes = options.most_bytes * 5 / 4) try {
+        fused({wall(2.0f, 0.01f)}, options);
+        return options.most_bytes;
+      } catch (const InvalidInput&) {
+      }
+  };
+  EXPECT_GT(least(60), 2 * least(0));
+}
+
 TEST(DepthFusion, CanBeCancelled) {
   RunContext context(1);
   context.cancel();

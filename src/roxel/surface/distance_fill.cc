@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "roxel/base/error.h"
+#include "roxel/base/formatted.h"
 #include "roxel/base/parallel.h"
 #include "roxel/surface/distance_voxels.inl"
 
@@ -20,6 +22,9 @@ constexpr float kRim = 1.5f;  ///< surfaces end within so many steps of a corner
 constexpr int kSmoothRounds = 6;
 const std::array<Coord, 6> kNeighbours{Coord(1, 0, 0),  Coord(-1, 0, 0), Coord(0, 1, 0),
                                        Coord(0, -1, 0), Coord(0, 0, 1),  Coord(0, 0, -1)};
+
+constexpr std::int64_t kBytesOfLeaf = Leaf::SIZE * sizeof(float) + 128;
+constexpr std::int64_t kBytesOfUnknown = 60;  ///< in Unknowns, and in the values before and after a round
 
 /// Corners whose distance is to be found, each with its neighbours: those of the list by number, others by
 /// value.
@@ -87,6 +92,19 @@ void grow_at_rims(DistanceField::Voxels& voxels, int reach) {
 
 }  // namespace
 
+std::int64_t lattice_bytes(std::int64_t leaves, std::int64_t corners) {
+  // The three trees of the field and the one that numbers unknowns; then lists of all unknowns.
+  return leaves * 4 * kBytesOfLeaf + corners * kBytesOfUnknown;
+}
+
+void check_lattice_bytes(std::int64_t bytes, std::int64_t most, double voxel_size) {
+  if (bytes <= most) return;
+  throw InvalidInput(
+      formatted("the surface's lattice of voxels of %g would take %lld MiB: found %lld MiB for "
+                "it, expected more memory, larger voxels, or less to fuse",
+                voxel_size, static_cast<long long>(bytes >> 20), static_cast<long long>(most >> 20)));
+}
+
 void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads) {
   if (!(strength > 0)) return;
   const auto seen = [](float weight) { return weight > 0; };
@@ -119,9 +137,12 @@ void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads
   for (std::size_t i = 0; i < now.size(); ++i) target.setValueOnly(all.places[i], now[i]);
 }
 
-void fill_unseen(DistanceField::Voxels& voxels, double hole_size, int threads) {
+void fill_unseen(DistanceField::Voxels& voxels, double hole_size, std::int64_t most_bytes, int threads) {
   if (!(hole_size > 0)) return;
   grow_at_rims(voxels, static_cast<int>(std::ceil(hole_size / 2)) + 1);
+  check_lattice_bytes(lattice_bytes(static_cast<std::int64_t>(voxels.weight->leafCount()),
+                                    static_cast<std::int64_t>(voxels.weight->activeVoxelCount())),
+                      most_bytes, voxels.voxel_size);
   const Unknowns unseen = find_unknowns(
       voxels, [](float weight) { return !(weight > 0); }, [](float weight) { return weight > 0; }, threads);
   std::vector<float> now(unseen.places.size()), next(now.size());

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "roxel/base/error.h"
+#include "roxel/surface/manifold.h"
 
 namespace roxel {
 namespace {
@@ -47,7 +48,8 @@ Surface simplified(const Surface& surface, const SimplificationOptions& options)
   fewer.mesh.triangles.clear();
   for (std::size_t t = 0; t + 2 < left.size(); t += 3)
     fewer.mesh.triangles.push_back({left[t], left[t + 1], left[t + 2]});
-  return kept_triangles(fewer, std::vector<std::uint8_t>(fewer.mesh.triangles.size(), 1));
+  return made_manifold(kept_triangles(fewer, std::vector<std::uint8_t>(fewer.mesh.triangles.size(), 1)))
+      .surface;  // collapses may let sheets touch
 }
 
 }  // namespace roxel

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "roxel/surface/distance_voxels.inl"
+#include "roxel/surface/manifold.h"
 
 namespace roxel {
 namespace {
@@ -251,7 +252,7 @@ Extraction extract_surface(const DistanceField& field, const ExtractionOptions& 
     const openvdb::Vec3s& p = mesh.points[i];
     whole.mesh.points[i] = voxels.origin + voxels.voxel_size * Vector3d(p.x(), p.y(), p.z());
   }
-  out.surface = kept_triangles(whole, keep);
+  out.surface = made_manifold(kept_triangles(whole, keep)).surface;
   return out;
 }
 
