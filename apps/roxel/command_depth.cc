@@ -36,7 +36,9 @@ OptionTable<DepthCommandOptions> depth_table() {
       .placeholder("DATASET")
       .unset("where the run has read them");
   table.add("from-volume", &DepthCommandOptions::from_volume)
-      .help("March through the volume again; else only where the run has no depth maps");
+      .help(
+          "March through the volume again; else only where the run has no depth maps, or others than "
+          "--depth-estimate and --depth-weight ask for");
   table.include(depth_option_table(), &DepthCommandOptions::stage);
   table.include(common_option_table(), &DepthCommandOptions::common);
   return table;
@@ -49,6 +51,14 @@ ReconstructOptions options_of(const FinishedRun& run) {
   for (const OptionField& field : reconstruct_option_table().fields())
     if (const nlohmann::json& value = run.option(field.name); !value.is_null()) used[field.name] = value;
   reconstruct_option_table().apply_json(options, used, (run.path / "summary.json").string() + ": options");
+  return options;
+}
+
+/// How the run's depth maps were made.
+nlohmann::ordered_json map_options_of(const FinishedRun& run) {
+  nlohmann::ordered_json options = depth_map_option_table().to_json({});
+  for (auto& [name, value] : options.items())
+    if (const nlohmann::json& used = run.option(name); !used.is_null()) value = used;
   return options;
 }
 
@@ -65,7 +75,8 @@ fs::path skies_of(const FinishedRun& run) {
 }
 
 /// Z, V, A of every view, from the saved volume.
-void march(FinishedRun& run, Input input, const fs::path& results, RunContext& context, double share) {
+void march(FinishedRun& run, Input input, const DepthOptions& wanted, const fs::path& results,
+           RunContext& context, double share) {
   const ReconstructOptions options = options_of(run);
   Reconstruction made;
   std::optional<Daylight> daylight;
@@ -78,6 +89,7 @@ void march(FinishedRun& run, Input input, const fs::path& results, RunContext& c
   made.volume = std::move(run.file.volume);
   ViewStageOptions stages;
   stages.render = false;
+  stages.depth_options = wanted;
   stages.progress_end = share;
   for_each_view_result(input.dataset, input.load, made, options, stages, context,
                        [&](const ViewResult& result) {
@@ -115,9 +127,10 @@ int run_depth(const Invocation& invocation, const DepthCommandOptions& options) 
   const OutputFolder folder(run.path);
   PartialResults results(folder.path());
   double begin = 0;
-  if (options.from_volume || !has_depth_maps(run.path, input.dataset)) {
+  if (options.from_volume || !has_depth_maps(run.path, input.dataset) ||
+      map_options_of(run) != depth_map_option_table().to_json(options.stage.map)) {
     begin = 0.3;
-    march(run, input, results.path(), session.context(), begin);
+    march(run, input, options.stage.map, results.path(), session.context(), begin);
   }
   const DepthStageFigures figures =
       refine_depth_files(input.dataset, input.load, {run.file.info.exposure, voxel_size},

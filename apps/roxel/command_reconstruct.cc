@@ -422,6 +422,7 @@ class Run {
     ViewStageOptions stages;
     stages.depth = options_.stages.depth;
     stages.render = options_.stages.render;
+    stages.depth_options = options_.depth.map;
     stages.progress_begin = kVolumeWritten;
     stages.progress_end = kViewsWritten;
     if (options_.stages.report) writer.keep_for_report(made_.scene.voxel_size);

@@ -289,6 +289,8 @@ DEPTH_CHANGES = {
     "bp-schedule": ([], ["--bp-schedule", "residual"]),
     "bp-sigma": ([], ["--bp-sigma", "0.3"]),
     "bp-sweeps": ([], ["--bp-sweeps", "2"]),
+    "depth-estimate": ([], ["--depth-estimate", "median"]),
+    "depth-weight": ([], ["--depth-weight", "times-opacity"]),
     "refine": ([], ["--no-refine"]),
     "refine-agree": ([], ["--no-refine-agree"]),
     "refine-noise": ([], ["--refine-noise", "0.2"]),

@@ -11,7 +11,7 @@ namespace {
 
 /// Responsibility of one chord and where in depth it lies.
 struct Share {
-  float r;
+  float weight;
   float depth;       ///< where rays that end in the chord end on average
   float half_chord;  ///< in depth
 };
@@ -21,10 +21,11 @@ struct PixelDepth {
 };
 
 /// Index of the share in which half of the responsibility is reached.
-std::size_t median_share(const std::vector<Share>& shares, float total) {
-  float sum = 0;
+std::size_t median_share(const std::vector<Share>& shares) {
+  float total = 0, sum = 0;
+  for (const Share& share : shares) total += share.weight;
   for (std::size_t i = 0; i < shares.size(); ++i)
-    if ((sum += shares[i].r) >= 0.5f * total) return i;
+    if ((sum += shares[i].weight) >= 0.5f * total) return i;
   return shares.size() - 1;
 }
 
@@ -32,7 +33,7 @@ std::size_t median_share(const std::vector<Share>& shares, float total) {
 PixelDepth moments(const std::vector<Share>& shares, std::size_t begin, std::size_t end) {
   double weight = 0, first = 0, second = 0;
   for (std::size_t i = begin; i < end; ++i) {
-    const double w = shares[i].r, d = shares[i].depth, h = shares[i].half_chord;
+    const double w = shares[i].weight, d = shares[i].depth, h = shares[i].half_chord;
     weight += w;
     first += w * d;
     second += w * (d * d + h * h / 3);
@@ -45,13 +46,13 @@ PixelDepth moments(const std::vector<Share>& shares, std::size_t begin, std::siz
 /// The run of shares around `middle` whose chords follow on each other and carry at least a fiftieth of the
 /// middle one's responsibility.
 std::pair<std::size_t, std::size_t> main_mode(const std::vector<Share>& shares, std::size_t middle) {
-  const float least = 0.02f * shares[middle].r;
+  const float least = 0.02f * shares[middle].weight;
   const auto joined = [&](std::size_t a, std::size_t b) {
     return shares[b].depth - shares[a].depth < 2 * (shares[a].half_chord + shares[b].half_chord);
   };
   std::size_t begin = middle, end = middle + 1;
-  while (begin > 0 && shares[begin - 1].r > least && joined(begin - 1, begin)) --begin;
-  while (end < shares.size() && shares[end].r > least && joined(end - 1, end)) ++end;
+  while (begin > 0 && shares[begin - 1].weight > least && joined(begin - 1, begin)) --begin;
+  while (end < shares.size() && shares[end].weight > least && joined(end - 1, end)) ++end;
   return {begin, end};
 }
 
@@ -59,7 +60,7 @@ PixelDepth summarise(const std::vector<Share>& shares, float total, float voxel_
                      DepthEstimate estimate) {
   if (total < DepthMap::kLeastOpacity || shares.empty()) return {0, 0, total};
   const PixelDepth mean = moments(shares, 0, shares.size());
-  const std::size_t middle = median_share(shares, total);
+  const std::size_t middle = median_share(shares);
   PixelDepth pixel = mean;
   if (estimate == DepthEstimate::kMedian) pixel.depth = shares[middle].depth;
   if (estimate == DepthEstimate::kMainMode) {
@@ -105,10 +106,12 @@ class PixelDepthMarch {
       const float prior = transmittance * step.opacity;
       transmittance *= 1 - step.opacity;
       if (step.slot >= box_slots_) continue;
-      const float r = options_.likelihood ? (z > 0 ? prior * step.likelihood / z : 0) : prior;
+      const float posterior = z > 0 ? prior * step.likelihood / z : 0;
+      const float r = options_.weight == DepthWeight::kPrior ? prior : posterior;
+      const float weight = options_.weight == DepthWeight::kTimesOpacity ? r * step.opacity : r;
       const float into_chord = step.length > 0 ? step.mean_path / step.length : 0.5f;
       const StepDepth chord = steps_.depth(i);
-      shares_.push_back({r, chord.middle + (2 * into_chord - 1) * chord.half_chord, chord.half_chord});
+      shares_.push_back({weight, chord.middle + (2 * into_chord - 1) * chord.half_chord, chord.half_chord});
       total += r;
       in_world = step.length > 0 ? 2 * chord.half_chord / step.length : in_world;
     }
@@ -136,7 +139,36 @@ class PixelDepthMarch {
   std::vector<Share> shares_;
 };
 
+OptionTable<DepthOptions> make_depth_map_table() {
+  OptionTable<DepthOptions> table;
+  table.group("Depth");
+  table
+      .add("depth-estimate", &DepthOptions::estimate,
+           {{"main-mode", DepthEstimate::kMainMode},
+            {"mean", DepthEstimate::kMean},
+            {"median", DepthEstimate::kMedian}})
+      .help(
+          "The volume's depth of a pixel: mean over the unbroken stretch where its ray most likely ends; or "
+          "over all of the ray; or median")
+      .source("[Jethwa04] eq. (6.1)");
+  table
+      .add("depth-weight", &DepthOptions::weight,
+           {{"posterior", DepthWeight::kPosterior},
+            {"times-opacity", DepthWeight::kTimesOpacity},
+            {"prior", DepthWeight::kPrior}})
+      .help(
+          "What a voxel counts in that: the probability that the ray ends there; that times its opacity, as "
+          "the thesis has it; or without the pixel's colour")
+      .source("[Jethwa04] eq. (6.1)");
+  return table;
+}
+
 }  // namespace
+
+const OptionTable<DepthOptions>& depth_map_option_table() {
+  static const OptionTable<DepthOptions> table = make_depth_map_table();
+  return table;
+}
 
 std::vector<SeenView> estimate_depth(const LatticeStack& stack, const SampleNode& views,
                                      const PassOptions& pass, const DepthOptions& options,

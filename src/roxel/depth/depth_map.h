@@ -2,6 +2,7 @@
 /// Depth and its variance per pixel, from the responsibilities of the voxels along the pixel's ray
 /// ([Jethwa04] section 6.2; docs/depth.md).
 
+#include "roxel/base/option_table.h"
 #include "roxel/infer/run_pass.h"
 #include "roxel/march/render.h"
 
@@ -17,15 +18,24 @@ struct DepthMap {
 };
 
 enum class DepthEstimate {
-  kMean,      ///< sum r d / sum r: [Jethwa04] eq. (6.1)
+  kMean,      ///< sum w d / sum w: [Jethwa04] eq. (6.1)
   kMedian,    ///< the depth that half of the responsibility lies in front of
   kMainMode,  ///< mean over the stretch of responsibility around the median that is not broken by a gap
 };
 
+enum class DepthWeight {
+  kPosterior,     ///< r_s: where the ray ends, given the pixel's colour
+  kTimesOpacity,  ///< r_s a_s: [Jethwa04] eq. (6.1); counts opacity twice, so that variances are too small
+  kPrior,         ///< a_s T_s: without looking at the image
+};
+
 struct DepthOptions {
   DepthEstimate estimate = DepthEstimate::kMainMode;
-  bool likelihood = true;  ///< weigh by the posterior r_s; false: by a_s T_s, without looking at the image
+  DepthWeight weight = DepthWeight::kPosterior;
 };
+
+/// Group "Depth": depth-estimate, depth-weight.
+const OptionTable<DepthOptions>& depth_map_option_table();
 
 /// For a rendering beside the depth map, from the same walk along each ray.
 struct RenderBeside {

@@ -73,7 +73,7 @@ TEST_F(Sheets, AnOpaqueSheetIsFoundWithinHalfAVoxel) {
   build({{7, 0.9999}});
   for (const DepthEstimate estimate_by :
        {DepthEstimate::kMean, DepthEstimate::kMedian, DepthEstimate::kMainMode}) {
-    const DepthMap map = estimate({estimate_by, true});
+    const DepthMap map = estimate({estimate_by, DepthWeight::kPosterior});
     for (int i = 0; i < 64; ++i) {
       EXPECT_NEAR(map.depth.data()[i], middle(7), 0.5 * kVoxel);
       EXPECT_NEAR(map.opacity.data()[i], 1, 1e-3);
@@ -90,21 +90,23 @@ TEST_F(Sheets, RaysEndWhereTheyEndOnAverageInTheirChord) {
   // Through the middle pixel's neighbour nearly along z: chord of one voxel. tau -> 0 ends in the middle, tau
   // = 5 after 1/5 - exp(-5)/(1 - exp(-5)) of it.
   build({{7, 0.01}});
-  EXPECT_NEAR(*estimate({DepthEstimate::kMean, false}).depth.pixel(4, 4), 0, 0);  // too faint: no depth
+  EXPECT_NEAR(*estimate({DepthEstimate::kMean, DepthWeight::kPrior}).depth.pixel(4, 4), 0,
+              0);  // too faint: no depth
   build({{7, 0.1}});
   const double tau = -std::log(0.9), e = 1 / tau - 0.9 / 0.1;
-  EXPECT_NEAR(*estimate({DepthEstimate::kMean, true}).depth.pixel(4, 4), 1 + kVoxel * (7 + e), 1e-4);
+  EXPECT_NEAR(*estimate({DepthEstimate::kMean, DepthWeight::kPosterior}).depth.pixel(4, 4),
+              1 + kVoxel * (7 + e), 1e-4);
   build({{7, 1 - std::exp(-5)}});
-  EXPECT_NEAR(*estimate({DepthEstimate::kMean, true}).depth.pixel(4, 4),
+  EXPECT_NEAR(*estimate({DepthEstimate::kMean, DepthWeight::kPosterior}).depth.pixel(4, 4),
               1 + kVoxel * (7 + 0.2 - std::exp(-5) / (1 - std::exp(-5))), 2e-3);
 }
 
 TEST_F(Sheets, TwoSurfacesAreTwoModes) {
   build({{2, 0.35}, {12, 0.999}});
   // Equal agreement: responsibilities 0.35 and nearly 0.65.
-  const DepthMap mean = estimate({DepthEstimate::kMean, true});
-  const DepthMap mode = estimate({DepthEstimate::kMainMode, true});
-  const DepthMap median = estimate({DepthEstimate::kMedian, true});
+  const DepthMap mean = estimate({DepthEstimate::kMean, DepthWeight::kPosterior});
+  const DepthMap mode = estimate({DepthEstimate::kMainMode, DepthWeight::kPosterior});
+  const DepthMap median = estimate({DepthEstimate::kMedian, DepthWeight::kPosterior});
   const double gap = middle(12) - middle(2);
   for (int i = 0; i < 64; ++i) {
     EXPECT_NEAR(mean.depth.data()[i], 0.35 * middle(2) + 0.65 * middle(12), 0.5 * kVoxel);
@@ -117,9 +119,22 @@ TEST_F(Sheets, TwoSurfacesAreTwoModes) {
   }
 }
 
+TEST_F(Sheets, TheThesisCountsOpacityTwice) {
+  build({{2, 0.35}, {12, 0.999}});
+  const DepthMap once = estimate({DepthEstimate::kMean, DepthWeight::kPosterior});
+  const DepthMap twice = estimate({DepthEstimate::kMean, DepthWeight::kTimesOpacity});
+  const double near = 0.35 * 0.35, far = 0.65 * 0.999;
+  const double expected = (near * middle(2) + far * middle(12)) / (near + far);
+  for (int i = 0; i < 64; ++i) {
+    EXPECT_NEAR(twice.depth.data()[i], expected, 0.5 * kVoxel);
+    EXPECT_LT(twice.variance.data()[i], 0.65 * once.variance.data()[i]);
+    EXPECT_EQ(twice.opacity.data()[i], once.opacity.data()[i]);
+  }
+}
+
 TEST_F(Sheets, TheNearerSurfaceWinsWhereItHasMore) {
   build({{2, 0.7}, {12, 0.999}});
-  const DepthMap mode = estimate({DepthEstimate::kMainMode, true});
+  const DepthMap mode = estimate({DepthEstimate::kMainMode, DepthWeight::kPosterior});
   for (int i = 0; i < 64; ++i) EXPECT_NEAR(mode.depth.data()[i], middle(2), 0.5 * kVoxel);
 }
 
@@ -128,21 +143,21 @@ TEST_F(Sheets, OpacityIsThePosteriorThatTheRayEndsInTheBox) {
   pass_.opacity.background.unknown_likelihood = 0.05f;
   const double a = 0.3,
                z = a * 1 + (1 - a) * 0.05;  // the middle pixel's chord is a voxel long to 1 part in 300
-  EXPECT_NEAR(*estimate({DepthEstimate::kMean, true}).opacity.pixel(4, 4), a / z, 2e-3);
-  EXPECT_NEAR(*estimate({DepthEstimate::kMean, false}).opacity.pixel(4, 4), a, 2e-3);
+  EXPECT_NEAR(*estimate({DepthEstimate::kMean, DepthWeight::kPosterior}).opacity.pixel(4, 4), a / z, 2e-3);
+  EXPECT_NEAR(*estimate({DepthEstimate::kMean, DepthWeight::kPrior}).opacity.pixel(4, 4), a, 2e-3);
 }
 
 TEST_F(Sheets, WhatDisagreesIsNotSeen) {
   build({{7, 0.6}});
   pass_.opacity.background.unknown_likelihood = 0.001f;
-  const DepthMap map = estimate({DepthEstimate::kMainMode, true}, kOther);
+  const DepthMap map = estimate({DepthEstimate::kMainMode, DepthWeight::kPosterior}, kOther);
   for (int i = 0; i < 64; ++i) {
     EXPECT_EQ(map.depth.data()[i], 0);
     EXPECT_EQ(map.variance.data()[i], 0);
     EXPECT_LT(map.opacity.data()[i], DepthMap::kLeastOpacity);
   }
   // Without looking at the image it is.
-  const DepthMap blind = estimate({DepthEstimate::kMainMode, false}, kOther);
+  const DepthMap blind = estimate({DepthEstimate::kMainMode, DepthWeight::kPrior}, kOther);
   for (int i = 0; i < 64; ++i) EXPECT_NEAR(blind.depth.data()[i], middle(7), 0.5 * kVoxel);
 }
 

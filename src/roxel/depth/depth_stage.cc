@@ -388,6 +388,7 @@ class DepthStage {
 OptionTable<DepthStageOptions> make_table() {
   using Options = DepthStageOptions;
   OptionTable<Options> table;
+  table.include(depth_map_option_table(), &Options::map);
   table.group("Depth");
   table.add("bp", &Options::bp)
       .help("Belief propagation over each view's depth")

@@ -8,12 +8,14 @@
 #include "roxel/base/run_context.h"
 #include "roxel/dataset/dataset.h"
 #include "roxel/depth/depth_layers.h"
+#include "roxel/depth/depth_map.h"
 #include "roxel/depth/propagate_depth.h"
 #include "roxel/depth/refine_view.h"
 
 namespace roxel {
 
 struct DepthStageOptions {
+  DepthOptions map;  ///< for who makes the maps; the stage reads them
   bool bp = true;
   DepthPrior bp_prior = DepthPrior::kEdgeAware;
   MessageSchedule bp_schedule = MessageSchedule::kSynchronous;
