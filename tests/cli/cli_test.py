@@ -25,7 +25,7 @@ TINY = ["--resolution", "16", "--levels", "2", "--passes", "2", "--no-mesh"]  # 
 
 def run(*arguments, **kwargs):
     """Runs roxel and returns what it said."""
-    return subprocess.run([ROXEL, *map(str, arguments)], capture_output=True, text=True, timeout=120, **kwargs)
+    return subprocess.run([ROXEL, *map(str, arguments)], capture_output=True, text=True, **{"timeout": 120, **kwargs})
 
 
 def start_until(moment, *arguments):

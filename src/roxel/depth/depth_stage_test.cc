@@ -1,6 +1,9 @@
 #include "roxel/depth/depth_stage.h"
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include <numbers>
 
 #include "roxel/depth/refine_fixture.h"
 
@@ -126,6 +129,42 @@ TEST_F(DepthStage, ViewsWithoutTextureConfirmNothing) {
   const DepthStageFigures blank = run();
   EXPECT_EQ(blank.matched_pixels, 0);
   EXPECT_EQ(blank.agreed_pixels, 0);
+}
+
+/// Cameras that look at the origin from afar; angles in degrees around y.
+class ChooseSources : public ::testing::Test {
+ protected:
+  void add(double degrees, double distance = 4) {
+    const double angle = degrees * std::numbers::pi / 180;
+    View view;
+    view.camera.intrinsics = {64, 48, 80, 80, 32, 24, 0};
+    view.camera.pose.centre = distance * Eigen::Vector3d(std::sin(angle), 0, -std::cos(angle));
+    view.camera.pose.rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    dataset_.views.push_back(view);
+  }
+  std::vector<int> chosen(int most) const { return choose_sources(dataset_, 0, depth_, most); }
+  Dataset dataset_;
+  Image depth_{64, 48, 1, 4.0f};
+};
+
+TEST_F(ChooseSources, AnglesThatFixDepthComeFirst) {
+  for (const double degrees : {0.0, 2.0, 18.0, 60.0, 5.0}) add(degrees);
+  EXPECT_EQ(chosen(9), (std::vector<int>{2, 4, 3, 1}));
+  EXPECT_EQ(chosen(2), (std::vector<int>{2, 4}));
+}
+
+TEST_F(ChooseSources, ViewsOfNothingThatIsSeenAreLeftOut) {
+  for (const double degrees : {0.0, 15.0, 180.0}) add(degrees);
+  dataset_.views[2].camera.pose.centre.z() -= 40;  // looks away from all points
+  add(0);                                          // from the same place: says nothing of depth
+  EXPECT_EQ(chosen(9), (std::vector<int>{1}));
+}
+
+TEST_F(ChooseSources, SharperAndBlunterViewsSayLess) {
+  add(0);
+  add(15, 12);
+  add(15, 4);
+  EXPECT_EQ(chosen(9), (std::vector<int>{2, 1}));
 }
 
 }  // namespace

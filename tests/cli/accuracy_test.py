@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""What `roxel` reaches on ray-traced worlds with known depth and surface: figures below which it must not fall. Needs the data sets
+plane and head, in the folder that the environment variable ROXEL_TEST_DATA names or in a folder shared/data above this one.
+
+    accuracy_test.py ROXEL [unittest arguments, e.g. Plane]
+"""
+
+import json
+import os
+import pathlib
+import tempfile
+import unittest
+
+import cli_test
+
+
+def data_set(name):
+    chosen = os.environ.get("ROXEL_TEST_DATA")
+    folders = [pathlib.Path(chosen)] if chosen else [p / "shared/data" for p in pathlib.Path(__file__).resolve().parents]
+    return next((folder / name for folder in folders if (folder / name).is_dir()), None)
+
+
+class AccuracyCase(cli_test.Case):
+    """A run of one data set, measured against the truth."""
+
+    name = None  # of the data set
+    bounds = None
+    diagonal = None  # of the bounds, world units
+
+    @classmethod
+    def setUpClass(cls):
+        data = data_set(cls.name) if cls.name else None
+        if data is None:
+            raise unittest.SkipTest(f"test data \"{cls.name}\" is not here; set ROXEL_TEST_DATA to its folder")
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-accuracy-"))
+        out = cls.folder / "run"
+        for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", "--voxel-size", "0.02", "--no-render", "--no-report",
+                         "--quiet"],
+                        ["eval", out, "--truth", data, "-o", cls.folder / "metrics", "--quiet"]):
+            done = cli_test.run(*command, timeout=1000)
+            assert done.returncode == 0, done.stderr
+        cls.metrics = json.loads((cls.folder / "metrics/metrics.json").read_text())
+
+    def within(self, method):
+        shares = self.metrics["depth"]["methods"][method]["share_within_voxels"]
+        return [100 * shares[voxels] for voxels in ("0.5", "1", "2")]
+
+    def f_score(self, share_of_diagonal):
+        within = self.metrics["surfaces"][-1]["within"]
+        return min(within, key=lambda entry: abs(entry["distance"] - share_of_diagonal * self.diagonal))["f_score"]
+
+    def check(self, within, f_scores, log_loss):
+        self.assertEqual(self.metrics["surfaces"][-1]["name"], "mesh")
+        volume, bp, refined = (self.within(method) for method in ("volume", "bp", "refined"))
+        for v, b, r, least in zip(volume, bp, refined, within):
+            self.assertGreaterEqual(b, v - 0.5)
+            self.assertGreater(r, max(v, b))
+            self.assertGreater(r, least)
+        for share, least in zip((0.005, 0.01), f_scores):
+            self.assertGreaterEqual(self.f_score(share), least)
+        refined = self.metrics["depth"]["methods"]["refined"]
+        self.assertTrue(0.58 <= refined["coverage_68"] <= 0.80, refined)
+        self.assertTrue(0.88 <= refined["coverage_95"] <= 0.99, refined)
+        self.assertLess(refined["log_loss"], log_loss)
+
+
+class Plane(AccuracyCase):
+    name, bounds, diagonal = "plane", "-1.3,-0.5,-1.3,1.3,0.5,1.3", 3.8105
+
+    def test_depth_uncertainty_and_surface(self):
+        self.check([99, 99.5, 99.8], [0.96, 0.995], -1.1)
+
+    def test_the_median_of_the_surface_is_near_a_hundredth_of_a_percent_of_the_diagonal(self):
+        self.assertLess(self.metrics["surfaces"][-1]["median_to_truth"], 1e-4 * self.diagonal)
+
+
+class Head(AccuracyCase):
+    name, bounds, diagonal = "head", "-1.5,-1.3,-2.5,1.5,1.3,1.4", 5.5651
+
+    def test_depth_uncertainty_and_surface(self):
+        self.check([73, 87.5, 94], [0.93, 0.98], 1.15)
+
+
+if __name__ == "__main__":
+    cli_test.main()
