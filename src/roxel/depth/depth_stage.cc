@@ -426,7 +426,7 @@ OptionTable<DepthStageOptions> make_table() {
       .range(1, 7);
   table.add("refine-sigmas", &Options::refine_sigmas)
       .help("Deviations of the volume's depth that refinement may move it by")
-      .range(0.1, 100);
+      .range(0.1, 1000);
   table.add("refine-noise", &Options::refine_noise)
       .help("Deviation of the images that patches are granted")
       .unit("of white, at middle grey")

@@ -28,7 +28,7 @@ struct DepthStageOptions {
   int refine_views = 8;
   int refine_rounds = 2;
   int refine_radius = 3;
-  double refine_sigmas = 16;
+  double refine_sigmas = 60;
   double refine_noise = 0.006;
   double refine_pixel_sigma = 0.035;
   std::int64_t seed = 1;

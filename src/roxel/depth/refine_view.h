@@ -23,7 +23,7 @@ struct RefineOptions {
   PatchOptions patch;
   int sources = 8;             ///< views that a patch is looked for in, at most 32
   int iterations = 3;          ///< rounds of propagation over the view
-  double sigmas = 16;          ///< deviations that a depth may move by
+  double sigmas = 60;          ///< deviations that a depth may move by
   double pixel_sigma = 0.035;  ///< pixels by which calibration errs, alike in all views
   std::int64_t seed = 1;
 };
