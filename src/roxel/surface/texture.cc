@@ -117,9 +117,9 @@ class Texturing {
     std::vector<Rgb> canonical;
     if (options_.match_light)
       for (const auto& [a, b, c] : mesh().triangles) canonical.push_back(mean_color(a, b, c));
-    out_.transients = drop_transients(out_.gains, canonical, choice, views);
-    weigh_sharpness(views, context_.thread_count());
     neighbours_ = face_neighbours(mesh());
+    out_.transients = drop_transients(neighbours_, out_.gains, canonical, choice, views);
+    weigh_sharpness(views, context_.thread_count());
     labels_ = choose_views(neighbours_, views, choice);
     out_.unseen = std::count(labels_.begin(), labels_.end(), kNoView);
     charts_ = find_charts(neighbours_, labels_);

@@ -185,15 +185,39 @@ TEST(ViewChoice, SeamsCostWhatTheOptionSays) {
   EXPECT_EQ(choose_views(kStrip, views, options)[1], kNoView);
 }
 
+const std::vector<std::array<std::int32_t, 3>> kAlone{{-1, -1, -1}};
+
+TEST(ViewChoice, TransientsArePatchesNotSingleTriangles) {
+  // A fan: the first triangle has all others around it. View 3 is off on the first alone, view 4 on all but
+  // the first.
+  const std::vector<std::array<std::int32_t, 3>> fan{{1, 2, 3}, {0, -1, -1}, {0, -1, -1}, {0, -1, -1}};
+  const FaceView right{0, 1, {0.5f, 0.5f, 0.5f}}, wrong{0, 1, {0.9f, 0.9f, 0.9f}};
+  const auto face = [&](bool third, bool fourth) {
+    std::vector<FaceView> views(5, right);
+    for (int v = 0; v < 5; ++v) {
+      if ((v == 3 && third) || (v == 4 && fourth)) views[v] = wrong;
+      views[v].view = v;
+    }
+    return views;
+  };
+  std::vector<std::vector<FaceView>> views{face(true, false), face(false, true), face(false, true),
+                                           face(false, true)};
+  EXPECT_EQ(drop_transients(fan, std::vector<Rgb>(5, {1, 1, 1}), {}, {}, views), 4);
+  for (const auto& of_face : views) {
+    ASSERT_EQ(of_face.size(), 4u);
+    EXPECT_EQ(of_face.back().view, 3);
+  }
+}
+
 TEST(ViewChoice, TwoViewsThatDifferAreBothKept) {
   std::vector<std::vector<FaceView>> views{{{0, 1, {1, 1, 1}}, {1, 1, {0, 0, 0}}}};
   const std::vector<Rgb> gains(3, {1, 1, 1});
-  EXPECT_EQ(drop_transients(gains, {}, {}, views), 0);
+  EXPECT_EQ(drop_transients(kAlone, gains, {}, {}, views), 0);
   auto decided = views;
-  EXPECT_EQ(drop_transients(gains, {{1, 1, 0.99f}}, {}, decided), 1);  // the canonical colour decides
+  EXPECT_EQ(drop_transients(kAlone, gains, {{1, 1, 0.99f}}, {}, decided), 1);  // the canonical colour decides
   EXPECT_EQ(decided[0][0].view, 0);
   views[0].push_back({2, 1, {0.001f, 0, 0}});
-  EXPECT_EQ(drop_transients(gains, {}, {}, views), 1);
+  EXPECT_EQ(drop_transients(kAlone, gains, {}, {}, views), 1);
   EXPECT_EQ(views[0][0].view, 1);
 }
 

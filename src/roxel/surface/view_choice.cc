@@ -13,6 +13,7 @@ constexpr std::size_t kMostViews = 12;  ///< candidates a triangle, the best one
 constexpr float kPlain = 0.02f;         ///< detail that is granted to plain triangles
 constexpr float kLeastSharpness = 1.0f / 3, kMostSharpness = 1.25f;
 constexpr float kTie = 1e-4f;  ///< cost of a view by its number: equals are decided the same way everywhere
+constexpr int kTransientRounds = 3;
 constexpr int kRounds = 24;
 constexpr int kSweeps = 10;
 constexpr float kDamping = 0.5f;
@@ -34,25 +35,46 @@ float distance(const Rgb& a, const Rgb& b) {
   return std::max({std::abs(a[0] - b[0]), std::abs(a[1] - b[1]), std::abs(a[2] - b[2])});
 }
 
-std::int64_t drop_from(const std::vector<Rgb>& gains, const Rgb* canonical, double transient,
-                       std::vector<FaceView>& views) {
+/// Which views of one triangle disagree with the others; none where there are too few to say.
+std::vector<std::uint8_t> outliers(const std::vector<Rgb>& gains, const Rgb* canonical, double transient,
+                                   const std::vector<FaceView>& views) {
+  std::vector<std::uint8_t> out(views.size());
   std::vector<Rgb> colors;
   for (const FaceView& view : views) colors.push_back(display(view.color, gains[view.view]));
   if (canonical) colors.push_back(display(*canonical, {1, 1, 1}));
-  if (colors.size() < 3) return 0;
+  if (colors.size() < 3) return out;
   Rgb middle;
   std::vector<float> values(colors.size());
   for (int c = 0; c < 3; ++c) {
     std::transform(colors.begin(), colors.end(), values.begin(), [&](const Rgb& color) { return color[c]; });
     middle[c] = median(values);
   }
-  std::vector<FaceView> kept;
-  for (std::size_t i = 0; i < views.size(); ++i)
-    if (distance(colors[i], middle) <= transient) kept.push_back(views[i]);
-  if (kept.empty()) return 0;
-  const std::int64_t dropped = std::ssize(views) - std::ssize(kept);
-  views = std::move(kept);
-  return dropped;
+  for (std::size_t i = 0; i < views.size(); ++i) out[i] = distance(colors[i], middle) > transient;
+  return out;
+}
+
+/// What is in the way of a view hides a patch, not a triangle here and there: each flag becomes that of most
+/// around it.
+using Flags = std::vector<std::vector<std::uint8_t>>;
+Flags of_most(const Flags& flags, const std::vector<std::vector<FaceView>>& views,
+              const std::vector<std::array<std::int32_t, 3>>& neighbours, int threads) {
+  Flags out = flags;
+  parallel_for_blocks(
+      std::ssize(flags), kChoiceGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+        for (std::int64_t f = begin; f < end; ++f)
+          for (std::size_t i = 0; i < flags[f].size(); ++i) {
+            int balance = flags[f][i] ? 1 : -1;
+            for (const std::int32_t n : neighbours[f]) {
+              if (n < 0) continue;
+              const auto same = std::lower_bound(views[n].begin(), views[n].end(), views[f][i].view,
+                                                 [](const FaceView& a, int view) { return a.view < view; });
+              if (same != views[n].end() && same->view == views[f][i].view)
+                balance += flags[n][same - views[n].begin()] ? 1 : -1;
+            }
+            if (balance != 0) out[f][i] = balance > 0;
+          }
+      });
+  return out;
 }
 
 /// What a triangle may choose from, and what each choice costs by itself.
@@ -195,18 +217,28 @@ void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads) {
       });
 }
 
-std::int64_t drop_transients(const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
+std::int64_t drop_transients(const std::vector<std::array<std::int32_t, 3>>& neighbours,
+                             const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
                              const ViewChoiceOptions& options, std::vector<std::vector<FaceView>>& views) {
-  std::vector<std::int64_t> dropped(views.size());
+  Flags flags(views.size());
   parallel_for_blocks(
       std::ssize(views), kChoiceGrain, options.threads, [&](std::int64_t begin, std::int64_t end, int) {
         for (std::int64_t f = begin; f < end; ++f)
-          dropped[f] =
-              drop_from(gains, canonical.empty() ? nullptr : &canonical[f], options.transient, views[f]);
+          flags[f] =
+              outliers(gains, canonical.empty() ? nullptr : &canonical[f], options.transient, views[f]);
       });
-  std::int64_t sum = 0;
-  for (const std::int64_t count : dropped) sum += count;
-  return sum;
+  for (int round = 0; round < kTransientRounds; ++round)
+    flags = of_most(flags, views, neighbours, options.threads);
+  std::int64_t dropped = 0;
+  for (std::size_t f = 0; f < views.size(); ++f) {
+    std::vector<FaceView> kept;
+    for (std::size_t i = 0; i < views[f].size(); ++i)
+      if (!flags[f][i]) kept.push_back(views[f][i]);
+    if (kept.empty()) continue;
+    dropped += std::ssize(views[f]) - std::ssize(kept);
+    views[f] = std::move(kept);
+  }
+  return dropped;
 }
 
 std::vector<int> choose_views(const std::vector<std::array<std::int32_t, 3>>& neighbours,
