@@ -2,13 +2,11 @@
 
 #include <chrono>
 #include <cinttypes>
-#include <limits>
 
 #include "command.h"
 #include "dense_workspace.h"
 #include "depth_files.h"
 #include "describe.h"
-#include "mesh_stage.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/content_hash.h"
 #include "roxel/base/error.h"
@@ -19,9 +17,8 @@
 #include "roxel/io/voxels_ply.h"
 #include "roxel/solve/estimate.h"
 #include "roxel/surface/depth_fusion.h"
-#include "run_checkpoints.h"
-#include "sky_again.h"
-#include "sky_stage.h"
+#include "run_options.h"
+#include "run_skies.h"
 #include "view_writer.h"
 
 namespace roxel::cli {
@@ -31,86 +28,6 @@ constexpr double kVolumeShare = 0.5;  ///< of the bar; what is left is for depth
 constexpr double kVolumeWritten = 0.52;
 constexpr double kViewsWritten = 0.58;
 constexpr double kDepthRefined = 0.85;
-
-enum class Export { kNone, kColmap };
-
-struct StageSwitches {
-  std::optional<std::string> init;
-  std::optional<std::string> sky;
-  std::optional<std::array<double, 2>> sun;
-  std::optional<std::string> sky_masks;
-  bool sky_again = false;
-  bool dry_run = false;
-  bool depth = true;
-  bool render = true;
-  bool mesh = true;
-  bool report = true;
-  bool save_surround = false;
-  Export exported = Export::kNone;
-};
-
-struct RunOptions {
-  ReconstructOptions reconstruct;
-  DepthStageOptions depth;
-  MeshOptions mesh;
-  InputOptions input;
-  StageSwitches stages;
-  CheckpointOptions checkpoints;
-  CommonOptions common;
-};
-
-OptionTable<StageSwitches> stage_table() {
-  OptionTable<StageSwitches> table;
-  table.group("Run");
-  table.add("init", &StageSwitches::init)
-      .help("Start from the volume of this run instead of from nothing")
-      .placeholder("RUN")
-      .unset("none");
-  table.add("sky", &StageSwitches::sky)
-      .help("Take the skies and sky masks of this run, of roxel sky or roxel reconstruct")
-      .placeholder("RUN")
-      .unset("fitted anew for --illumination sky, else none");
-  table.add("sun", &StageSwitches::sun)
-      .help(
-          "Where the sun stands, for skies that are fitted anew: degrees clockwise from north (+Y), degrees "
-          "above the horizon")
-      .placeholder("AZ,EL")
-      .unit("degrees")
-      .range(-360, 360)
-      .unset("from time and place, else the brightest spot");
-  table.add("sky-masks", &StageSwitches::sky_masks)
-      .help("Folder of masks NAME.png by hand, 255 = sky, for skies that are fitted anew")
-      .placeholder("DIR")
-      .unset("found from variance, colour and luminance");
-  table.add("sky-again", &StageSwitches::sky_again)
-      .help("After the first level, fit skies again with the rays that the volume leaves unexplained")
-      .source("[Jethwa04] section 7.2.2");
-  table.add("dry-run", &StageSwitches::dry_run)
-      .help("Say what would be done, and what memory and time it would take");
-  table.add("depth", &StageSwitches::depth).help("Depth maps: depth/NAME.exr and .png");
-  table.add("render", &StageSwitches::render)
-      .help("Pictures of the input views: render/NAME.png and error/NAME.png");
-  table.add("mesh", &StageSwitches::mesh)
-      .help("The surface from the depth maps: mesh.ply, mesh.glb, mesh.obj; needs --depth");
-  table.add("report", &StageSwitches::report).help("A page to look at: report.html");
-  table.add("save-surround", &StageSwitches::save_surround)
-      .help("Keep the voxels around the box in volume.vdb");
-  table.add("export", &StageSwitches::exported, {{"none", Export::kNone}, {"colmap", Export::kColmap}})
-      .help("Depth and normals for other programs, too: a COLMAP dense workspace in RUN/colmap");
-  return table;
-}
-
-OptionTable<RunOptions> run_table() {
-  OptionTable<RunOptions> table;
-  table.include(input_option_table(), &RunOptions::input);
-  table.include(stage_table(), &RunOptions::stages);
-  table.include(checkpoint_option_table(), &RunOptions::checkpoints);
-  table.include(reconstruct_option_table(), &RunOptions::reconstruct);
-  table.include(depth_option_table(), &RunOptions::depth);
-  table.include(mesh_option_table(), &RunOptions::mesh);
-  table.include(common_option_table(), &RunOptions::common);
-  return table;
-}
 
 /// Times the stages of a run one after the other.
 class Stopwatch {
@@ -161,18 +78,6 @@ std::string pass_text(const PassRecord& record, const ReconstructOptions& option
   return text;
 }
 
-/// Whether all photographs say when and where they were taken, and some are more than a quarter of an hour
-/// apart.
-bool several_times_of_day(const Dataset& dataset) {
-  constexpr double kSameLight_s = 900;
-  double first = std::numeric_limits<double>::infinity(), last = -first;
-  for (const View& view : dataset.views) {
-    if (!view.time_utc_s || !view.latitude_deg || !view.longitude_deg) return false;
-    first = std::min(first, *view.time_utc_s), last = std::max(last, *view.time_utc_s);
-  }
-  return last - first > kSameLight_s;
-}
-
 /// Pictures are in the photographs' own response; high dynamic range goes through sRGB.
 Response picture_response(const Input& input, const Scene& scene) {
   return scene.exposure == 1 && input.response ? *input.response : Response{};
@@ -185,7 +90,8 @@ class Run {
       : invocation_(invocation),
         options_(options),
         session_(options.common),
-        input_(read_input(invocation.inputs.front(), options.input, session_)) {}
+        input_(read_input(invocation.inputs.front(), options.input, session_)),
+        skies_(invocation, options, session_, input_) {}
 
   int execute() {
     if (options_.stages.dry_run) return describe_only();
@@ -203,14 +109,13 @@ class Run {
     if (std::filesystem::exists(folder.path() / "summary.json")) partial_.emplace(folder.path());
     const std::filesystem::path& results = partial_ ? partial_->path() : folder.path();
     run_ = folder.path();
-    results_ = results;
     hashes_ = hash_images(input_.dataset, session_.context());
     stopwatch_.lap();
     RunCheckpoints checkpoints(folder.path(), options_.checkpoints, options_.common, made_from());
     Checkpoint* const resume = checkpoints.find();
     if (resume) seconds_before_ = resume->summary.seconds;
     try {
-      find_daylight(results);
+      if (skies_.find(results)) add_stage("sky");
       make_volume(initial ? &initial->volume : nullptr, resume, checkpoints);
       if (initial && initial->info.exposure != made_.scene.exposure)
         warn(options_.common,
@@ -240,93 +145,6 @@ class Run {
     session_.display().clear();
     print_result(options_.common, description.text, json_text(description.json));
     return 0;
-  }
-
-  /// The skies, where they are given or asked for; from then on the photographs come with sky masks.
-  void find_daylight(const std::filesystem::path& results) {
-    const IlluminationChoice choice = options_.reconstruct.illumination;
-    const bool wanted = choice == IlluminationChoice::kSky || choice == IlluminationChoice::kSkyNormal;
-    const bool likely = choice == IlluminationChoice::kAuto && several_times_of_day(input_.dataset);
-    const bool fitted = !options_.stages.sky && (wanted || likely);
-    check_sky_options(fitted);
-    if (fitted && !find_skies(results, wanted)) return;
-    if (!fitted && !options_.stages.sky) return;
-    const std::filesystem::path skies = fitted ? results : std::filesystem::path(*options_.stages.sky);
-    daylight_ = read_daylight(skies, input_.dataset);
-    if (daylight_->masks) input_.load = with_sky_masks(input_.load, skies);
-    if (fitted && options_.stages.sky_again && options_.reconstruct.levels > 1) {
-      doubt_ = std::make_shared<std::atomic<bool>>(true);
-      input_.load = with_doubt(input_.load, up(), doubt_);
-    }
-  }
-
-  /// What says how skies are fitted does nothing where none is.
-  void check_sky_options(bool fitted) const {
-    if (fitted) return;
-    const char* idle = options_.stages.sun ? "--sun" : options_.stages.sky_masks ? "--sky-masks" : nullptr;
-    if (idle)
-      throw_invalid(idle, "no sky that is fitted in this run",
-                    "--illumination sky or sky-normal, without --sky RUN");
-  }
-
-  SkyOptions sky_options() const {
-    SkyOptions options;
-    options.sun = options_.stages.sun;
-    options.sky_masks = options_.stages.sky_masks;
-    sky_option_table().validate(options);
-    return options;
-  }
-
-  /// Fits the skies. Where they were not asked for, half of the photographs must turn out to have one.
-  bool find_skies(const std::filesystem::path& results, bool wanted) {
-    sky_input_ = read_sky_input(invocation_.inputs.front(), options_.input, sky_options(), session_);
-    skies_ = fit_skies(*sky_input_, sky_options(), results, session_, input_.dataset.warnings);
-    add_stage("sky");
-    std::size_t lit = 0;
-    for (const auto& node : skies_)
-      if (node.value("model", "none") != "none") lit += node.value("images", std::size_t{0});
-    const bool found = wanted || 2 * lit >= input_.dataset.views.size();
-    if (!wanted)
-      input_.dataset.notes.push_back("light: photographs of several times of day, of which " +
-                                     std::to_string(lit) + " of " +
-                                     std::to_string(input_.dataset.views.size()) +
-                                     (found ? " have a sky" : " have a sky: too few to divide it out"));
-    if (found) return true;
-    skies_.clear();
-    std::filesystem::remove_all(results / "sky");
-    return false;
-  }
-
-  Eigen::Vector3d up() const {
-    return sky_input_->tasks.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
-                                     : Eigen::Vector3d(sky_input_->tasks.front().sky_from_world.transpose() *
-                                                       Eigen::Vector3d::UnitZ());
-  }
-
-  /// Skies again, with what a first volume leaves unexplained. From here on masks are not doubted.
-  std::optional<Daylight> look_at_skies_again(const Volume& volume, const Scene& scene,
-                                              RunCheckpoints& checkpoints) {
-    *doubt_ = false;
-    const OpenRays open = open_rays(volume, input_.dataset, scene, up(), session_.context());
-    for (const SkyAgain& again :
-         fit_skies_again(*sky_input_, sky_options(), open, results_, session_, skies_))
-      skies_again_.push_back(to_json(again));
-    try {
-      if (options_.checkpoints.checkpoints)
-        keep_for_resume(run_, results_, {{"skies", skies_}, {"again", skies_again_}});
-    } catch (const IoError& error) {
-      checkpoints.give_up(error.what());  // later ones would be of no use without these skies
-    }
-    return read_daylight(results_, input_.dataset);
-  }
-
-  /// What look_at_skies_again found before the run was interrupted.
-  Daylight recall_skies() {
-    *doubt_ = false;
-    const nlohmann::ordered_json kept = recall_for_resume(run_, results_);
-    skies_ = kept.at("skies").get<std::vector<nlohmann::ordered_json>>();
-    skies_again_ = kept.at("again").get<std::vector<nlohmann::ordered_json>>();
-    return read_daylight(results_, input_.dataset);
   }
 
   /// Of what a volume depends on beside images and cameras.
@@ -370,12 +188,7 @@ class Run {
     hooks.initial = initial;
     hooks.resume = resume;
     hooks.checkpoint = [&](const CheckpointView& checkpoint) { checkpoints.offer(checkpoint); };
-    if (daylight_) hooks.daylight = &*daylight_;
-    if (doubt_)
-      hooks.look_at_skies_again = [&](const Volume& volume, const Scene& scene) {
-        return look_at_skies_again(volume, scene, checkpoints);
-      };
-    if (doubt_) hooks.recall_skies = [&] { return recall_skies(); };
+    skies_.add_to(hooks, run_, checkpoints);
     hooks.after_survey = [&](const Scene& scene) {
       for (const std::string& warning : scene.warnings) warn(options_.common, warning);
     };
@@ -541,8 +354,8 @@ class Run {
     record.scene = made_.scene;
     record.frame = made_.volume.index(0).frame();
     record.summary = made_.summary;
-    record.skies = skies_;
-    record.skies_again = skies_again_;
+    record.skies = skies_.nodes();
+    record.skies_again = skies_.again();
     record.warnings = input_.dataset.warnings;
     record.warnings.insert(record.warnings.end(), made_.scene.warnings.begin(), made_.scene.warnings.end());
     record.views = views_;
@@ -580,13 +393,9 @@ class Run {
   std::vector<std::string> hashes_;
   Stopwatch stopwatch_;
   std::optional<PartialResults> partial_;
-  std::optional<Daylight> daylight_;
-  std::vector<nlohmann::ordered_json> skies_, skies_again_;
-  std::optional<SkyInput> sky_input_;         ///< of skies that are fitted in this run
-  std::shared_ptr<std::atomic<bool>> doubt_;  ///< whether sky masks may lack sky; null: never
-  double seconds_before_ = 0;                 ///< of the parts before this one, of a run that is resumed
+  RunSkies skies_;
+  double seconds_before_ = 0;  ///< of the parts before this one, of a run that is resumed
   std::filesystem::path run_;
-  std::filesystem::path results_;
   Reconstruction made_;
   std::vector<ViewFigures> views_;
   std::vector<ReportView> report_views_;

@@ -1,0 +1,120 @@
+#include "run_skies.h"
+
+#include <limits>
+
+#include "roxel/base/error.h"
+
+namespace roxel::cli {
+namespace {
+
+/// Whether all photographs say when and where they were taken, and some are more than a quarter of an hour
+/// apart.
+bool several_times_of_day(const Dataset& dataset) {
+  constexpr double kSameLight_s = 900;
+  double first = std::numeric_limits<double>::infinity(), last = -first;
+  for (const View& view : dataset.views) {
+    if (!view.time_utc_s || !view.latitude_deg || !view.longitude_deg) return false;
+    first = std::min(first, *view.time_utc_s), last = std::max(last, *view.time_utc_s);
+  }
+  return last - first > kSameLight_s;
+}
+
+}  // namespace
+
+RunSkies::RunSkies(const Invocation& invocation, const RunOptions& options, Session& session, Input& input)
+    : invocation_(invocation), options_(options), session_(session), input_(input) {}
+
+bool RunSkies::find(const std::filesystem::path& results) {
+  results_ = results;
+  const IlluminationChoice choice = options_.reconstruct.illumination;
+  const bool wanted = choice == IlluminationChoice::kSky || choice == IlluminationChoice::kSkyNormal;
+  const bool likely = choice == IlluminationChoice::kAuto && several_times_of_day(input_.dataset);
+  const bool fitted = !options_.stages.sky && (wanted || likely);
+  check_sky_options(fitted);
+  if (fitted && !find_skies(wanted)) return true;
+  if (!fitted && !options_.stages.sky) return false;
+  const std::filesystem::path skies = fitted ? results_ : std::filesystem::path(*options_.stages.sky);
+  daylight_ = read_daylight(skies, input_.dataset);
+  if (daylight_->masks) input_.load = with_sky_masks(input_.load, skies);
+  if (fitted && options_.stages.sky_again && options_.reconstruct.levels > 1) {
+    doubt_ = std::make_shared<std::atomic<bool>>(true);
+    input_.load = with_doubt(input_.load, up(), doubt_);
+  }
+  return fitted;
+}
+
+void RunSkies::check_sky_options(bool fitted) const {
+  if (fitted) return;
+  const char* idle = options_.stages.sun ? "--sun" : options_.stages.sky_masks ? "--sky-masks" : nullptr;
+  if (idle)
+    throw_invalid(idle, "no sky that is fitted in this run",
+                  "--illumination sky or sky-normal, without --sky RUN");
+}
+
+SkyOptions RunSkies::sky_options() const {
+  SkyOptions options;
+  options.sun = options_.stages.sun;
+  options.sky_masks = options_.stages.sky_masks;
+  sky_option_table().validate(options);
+  return options;
+}
+
+bool RunSkies::find_skies(bool wanted) {
+  sky_input_ = read_sky_input(invocation_.inputs.front(), options_.input, sky_options(), session_);
+  skies_ = fit_skies(*sky_input_, sky_options(), results_, session_, input_.dataset.warnings);
+  std::size_t lit = 0;
+  for (const auto& node : skies_)
+    if (node.value("model", "none") != "none") lit += node.value("images", std::size_t{0});
+  const bool found = wanted || 2 * lit >= input_.dataset.views.size();
+  if (!wanted)
+    input_.dataset.notes.push_back("light: photographs of several times of day, of which " +
+                                   std::to_string(lit) + " of " +
+                                   std::to_string(input_.dataset.views.size()) +
+                                   (found ? " have a sky" : " have a sky: too few to divide it out"));
+  if (found) return true;
+  skies_.clear();
+  std::filesystem::remove_all(results_ / "sky");
+  return false;
+}
+
+Eigen::Vector3d RunSkies::up() const {
+  return sky_input_->tasks.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
+                                   : Eigen::Vector3d(sky_input_->tasks.front().sky_from_world.transpose() *
+                                                     Eigen::Vector3d::UnitZ());
+}
+
+std::optional<Daylight> RunSkies::look_at_skies_again(const Volume& volume, const Scene& scene,
+                                                      RunCheckpoints& checkpoints) {
+  *doubt_ = false;
+  const OpenRays open = open_rays(volume, input_.dataset, scene, up(), session_.context());
+  for (const SkyAgain& again : fit_skies_again(*sky_input_, sky_options(), open, results_, session_, skies_))
+    skies_again_.push_back(to_json(again));
+  try {
+    if (options_.checkpoints.checkpoints)
+      keep_for_resume(run_, results_, {{"skies", skies_}, {"again", skies_again_}});
+  } catch (const IoError& error) {
+    checkpoints.give_up(error.what());  // later ones would be of no use without these skies
+  }
+  return read_daylight(results_, input_.dataset);
+}
+
+Daylight RunSkies::recall_skies() {
+  *doubt_ = false;
+  const nlohmann::ordered_json kept = recall_for_resume(run_, results_);
+  skies_ = kept.at("skies").get<std::vector<nlohmann::ordered_json>>();
+  skies_again_ = kept.at("again").get<std::vector<nlohmann::ordered_json>>();
+  return read_daylight(results_, input_.dataset);
+}
+
+void RunSkies::add_to(ReconstructHooks& hooks, const std::filesystem::path& run,
+                      RunCheckpoints& checkpoints) {
+  run_ = run;
+  if (daylight_) hooks.daylight = &*daylight_;
+  if (!doubt_) return;
+  hooks.look_at_skies_again = [this, &checkpoints](const Volume& volume, const Scene& scene) {
+    return look_at_skies_again(volume, scene, checkpoints);
+  };
+  hooks.recall_skies = [this] { return recall_skies(); };
+}
+
+}  // namespace roxel::cli
