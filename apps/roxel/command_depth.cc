@@ -106,8 +106,8 @@ nlohmann::ordered_json new_summary(const FinishedRun& run, const DepthStageFigur
   const std::vector<StageRecord> records = stage_records(figures);
   nlohmann::ordered_json stages = nlohmann::ordered_json::array();
   for (const auto& stage : summary.value("stages", nlohmann::ordered_json::array()))
-    if (std::none_of(records.begin(), records.end(),
-                     [&](const StageRecord& r) { return r.name == stage.value("name", ""); }))
+    if (const std::string name = stage.value("name", "");
+        name != kPropagationStage && name != kRefinementStage)
       stages.push_back(stage);
   for (const StageRecord& r : records)
     stages.push_back({{"name", r.name}, {"seconds", r.seconds}, {"peak_memory_bytes", r.peak_memory_bytes}});
@@ -150,6 +150,9 @@ int run_depth(const Invocation& invocation, const DepthCommandOptions& options) 
   if (fs::is_regular_file(run.path / "mesh.ply"))
     warn(options.common, "the mesh is still that of the earlier depth maps: roxel mesh " + run.path.string() +
                              " makes it anew");
+  if (fs::is_directory(run.path / "colmap"))
+    warn(options.common, "colmap is still of the earlier depth maps: roxel convert " + run.path.string() +
+                             " --to colmap-dense makes a new one");
   print_result(options.common, brief(figures) + "written to " + run.path.string() + "\n",
                json_text(to_json(figures)));
   return 0;

@@ -210,7 +210,7 @@ class Run {
     refine_depth(results);
     export_depth(results);
     session_.context().throw_if_cancelled();
-    if (options_.stages.depth && options_.stages.mesh) write_mesh(results);
+    if (options_.stages.depth && options_.stages.mesh) write_mesh_or_leave_run(results);
     if (options_.stages.report) write_report(results);
     const std::string json = write_summary(results);
     if (partial_) partial_->publish([&] { remove_results(folder); });
@@ -309,6 +309,19 @@ class Run {
       for (const std::string& warning : mesh.warnings) warn(options_.common, warning);
     });
     add_stage("mesh");
+  }
+
+  /// Where options ask for a mesh that cannot be made, a new run is left with all but that, for `roxel mesh`.
+  void write_mesh_or_leave_run(const std::filesystem::path& results) {
+    try {
+      write_mesh(results);
+    } catch (const InvalidInput& error) {
+      if (!partial_) {
+        made_.summary.notes.push_back(std::string("no mesh: ") + error.what());
+        write_summary(results);
+      }
+      throw;
+    }
   }
 
   nlohmann::ordered_json summary_so_far() {

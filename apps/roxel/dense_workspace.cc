@@ -100,6 +100,10 @@ std::vector<TrackedPoint> shared_points(const Dataset& dataset, const std::vecto
 
 void write_dense_workspace(Dataset dataset, const PhotographLoader& load, const fs::path& run,
                            const fs::path& results, double white, double voxel_size, RunContext& context) {
+  for (const View& view : dataset.views)
+    if (!fs::is_regular_file(depth_path(run, view.name)))
+      throw_invalid(run.string(), "no depth/" + view.name + ".exr",
+                    "a run with depth maps (roxel reconstruct without --no-depth, or roxel depth)");
   std::vector<ThinDepth> thin(dataset.views.size());
   std::atomic<int> done{0};
   std::atomic<bool> any{false};
@@ -129,6 +133,7 @@ void write_dense_workspace(Dataset dataset, const PhotographLoader& load, const 
     std::error_code ignored;
     fs::remove_all(results / "stereo", ignored);
     fs::remove_all(results / "images", ignored);
+    fs::remove(results, ignored);  // where nothing else is in it
     throw NoSurface((run / "depth").string() +
                     ": found no pixel with depth in any view, expected depth maps of a surface");
   }

@@ -5,6 +5,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
+#include "roxel/base/parallel.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
 #include "roxel/report/pictures.h"
@@ -134,6 +135,11 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
     figures = run_depth_stage(dataset, load, scene, files, first, context, progress_begin, middle);
     figures.propagate_peak_bytes = peak_memory_bytes();
   }
+  if (!options.bp && !options.refine)
+    parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
+      context.throw_if_cancelled();
+      files.write(static_cast<int>(v), files.read(static_cast<int>(v)));  // without what was added before
+    });
   if (options.refine) {
     figures.add(run_depth_stage(dataset, load, scene, files, second, context, middle, progress_end));
     figures.refine_peak_bytes = peak_memory_bytes();
@@ -183,9 +189,9 @@ void add_refined_pictures(const DepthLayers& layers, double voxel_size, ReportVi
 std::vector<StageRecord> stage_records(const DepthStageFigures& figures) {
   std::vector<StageRecord> records;
   if (figures.propagate_seconds > 0)
-    records.push_back({"belief propagation", figures.propagate_seconds, figures.propagate_peak_bytes});
+    records.push_back({kPropagationStage, figures.propagate_seconds, figures.propagate_peak_bytes});
   if (figures.refine_seconds > 0)
-    records.push_back({"refine depth", figures.refine_seconds, figures.refine_peak_bytes});
+    records.push_back({kRefinementStage, figures.refine_seconds, figures.refine_peak_bytes});
   return records;
 }
 

@@ -10,6 +10,10 @@
 
 namespace roxel::cli {
 
+/// In "stages" of summary.json.
+inline constexpr const char* kPropagationStage = "belief propagation";
+inline constexpr const char* kRefinementStage = "refine depth";
+
 /// Where the stage reads and writes.
 struct DepthFolders {
   std::filesystem::path results;  ///< written to; depth maps in it are read first

@@ -481,7 +481,7 @@ class Depth(Case):
         empty = ["--bounds=-1.5,-1.5,1.4,-1.2,-1.2,1.8", "--no-report", "--export", "colmap"]
         out, summary = self.reconstruct("nothing", *empty)
         self.assertTrue(any(note.startswith("no export: ") for note in summary["notes"]), summary["notes"])
-        self.assertFalse((out / "colmap/images").exists() or (out / "colmap/stereo").exists())
+        self.assertFalse((out / "colmap").exists())
         voxels = self.folder / "voxels-alone"
         finer = ["--resolution", "24", "--levels", "1", "--passes", "2", "--no-mesh", "--quiet"]
         self.succeed("reconstruct", self.data, "-o", voxels, *finer, *empty)
@@ -510,6 +510,22 @@ class Depth(Case):
         self.expect_error(1, "cannot be made", "convert", out, "--to", "colmap-dense", "-o", "/proc/roxel", "--quiet")
         (self.folder / "a-file").write_text("x")
         self.expect_error(2, "a file", "convert", out, "--to", "colmap-dense", "-o", self.folder / "a-file", "--quiet")
+
+    def test_depth_without_either_method_leaves_the_volume_s_alone(self):
+        out, _ = self.reconstruct("plain-again", "--no-report", "--export", "colmap")
+        self.assertEqual(self.channels(out), list(self.REFINED))
+        said = self.succeed("depth", out, "--no-bp", "--no-refine").stderr
+        self.assertIn("colmap is still of the earlier depth maps", said)
+        self.assertEqual(self.channels(out), [])
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertIsNone(summary["depth"])
+        self.assertFalse({"belief propagation", "refine depth"} & {stage["name"] for stage in summary["stages"]})
+
+    def test_a_run_without_depth_has_nothing_to_convert(self):
+        out, _ = self.reconstruct("no-maps", "--no-depth", "--no-render", "--no-report")
+        self.expect_error(2, "no depth/000.exr, expected a run with depth maps", "convert", out, "--to", "colmap-dense", "-o",
+                          self.folder / "none")
+        self.assertFalse((self.folder / "none").exists())
 
     def test_filling_keeps_to_what_masks_call_foreground(self):
         plain, _ = self.reconstruct("unfilled", "--no-refine", "--no-report", "--export", "colmap")

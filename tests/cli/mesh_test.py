@@ -151,6 +151,16 @@ class Mesh(Case):
         self.assertTrue(any(note.startswith("resumed after") for note in summary["notes"]), summary["notes"])
         self.assertLessEqual(summary["mesh"]["triangles"], 600)
 
+    def test_a_new_run_whose_mesh_is_refused_can_be_given_another(self):
+        out = self.folder / "first"
+        arguments = ["reconstruct", self.photographs, "-o", out, *SMALL, "--faces", "4", "--no-checkpoints", "--quiet"]
+        self.expect_error(2, "--faces: ", *arguments)
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertIsNone(summary["mesh"])
+        self.assertTrue(any(note.startswith("no mesh: ") for note in summary["notes"]))
+        self.succeed("mesh", out, "--faces", "600", "--quiet")
+        self.assertLessEqual(json.loads((out / "summary.json").read_text())["mesh"]["triangles"], 600)
+
     def test_a_run_whose_views_agree_on_nothing_says_so_and_has_the_rest(self):
         out = self.folder / "none"
         said = self.succeed("reconstruct", self.photographs, "-o", out, *SMALL, "--min-views", "50").stderr

@@ -164,9 +164,8 @@ class DepthStage {
     figures_.propagate_seconds = clock.seconds();
   }
 
-  void refine_all() {
-    const Clock clock;
-    set_scale();
+  /// Refines each view by itself; returns what each was matched with. Views are held only while it runs.
+  std::vector<std::vector<int>> match_all() {
     ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24);
     std::vector<std::vector<int>> sources(count_);
     Aside writing(context_.thread_count() > 1);
@@ -175,6 +174,14 @@ class DepthStage {
       report("refining depth", 5);
     }
     writing.finish();
+    return sources;
+  }
+
+  void refine_all() {
+    const Clock clock;
+    set_scale();
+    const std::vector<std::vector<int>> sources = match_all();
+    Aside writing(context_.thread_count() > 1);
     ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 24);
     for (int v = 0; v < count_; ++v) {
       agree_one(v, sources[v], refined, writing);
@@ -206,12 +213,13 @@ class DepthStage {
     return layers.depth_bp.empty() ? believed_depth(layers) : layers.depth_bp;
   }
 
-  /// The volume's variance, belief propagation's where only that has depth.
+  /// The volume's variance, belief propagation's where that has depth and the volume's is not believed.
   static Image variance_before(const DepthLayers& layers) {
     Image variance = layers.variance;
     if (layers.variance_bp.empty()) return variance;
+    const Image believed = believed_depth(layers);
     for (std::size_t i = 0; i < variance.data().size(); ++i)
-      if (!(layers.depth.data()[i] > 0)) variance.data()[i] = layers.variance_bp.data()[i];
+      if (!(believed.data()[i] > 0)) variance.data()[i] = layers.variance_bp.data()[i];
     return variance;
   }
 

@@ -131,6 +131,17 @@ TEST_F(DepthStage, ViewsWithoutTextureConfirmNothing) {
   EXPECT_EQ(blank.agreed_pixels, 0);
 }
 
+TEST_F(DepthStage, FilledPixelsKeepTheVarianceThatTheyWereFilledWith) {
+  for (auto& [name, photo] : photographs_) std::fill(photo.rgb.data().begin(), photo.rgb.data().end(), 0.4f);
+  DepthLayers& layers = layers_[0];
+  layers.depth_bp = layers.depth;
+  layers.variance_bp = Image(layers.depth.width(), layers.depth.height(), 1, 0.09f);
+  *layers.opacity.pixel(40, 40) = 0.3f;  // its depth is not believed, but belief propagation has given it one
+  run();
+  EXPECT_FLOAT_EQ(*layers.variance_refined.pixel(40, 40), 0.09f);
+  EXPECT_FLOAT_EQ(*layers.variance_refined.pixel(60, 40), *layers.variance.pixel(60, 40));
+}
+
 /// Cameras that look at the origin from afar; angles in degrees around y.
 class ChooseSources : public ::testing::Test {
  protected:

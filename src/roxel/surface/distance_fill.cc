@@ -70,8 +70,9 @@ Unknowns find_unknowns(const DistanceField::Voxels& voxels, const IsUnknown& is_
   return out;
 }
 
-/// Adds the surroundings of places where seen surface ends.
-void grow_at_rims(DistanceField::Voxels& voxels, int reach) {
+/// Adds the surroundings of places where seen surface ends. Throws InvalidInput where what is to be filled
+/// then would take more than `most_bytes`.
+void grow_at_rims(DistanceField::Voxels& voxels, int reach, std::int64_t most_bytes) {
   const openvdb::MaskTree::Ptr made = make_tree<openvdb::MaskGrid>();
   openvdb::MaskTree& rims = *made;
   openvdb::tree::ValueAccessor<openvdb::MaskTree> mark(rims);
@@ -87,6 +88,10 @@ void grow_at_rims(DistanceField::Voxels& voxels, int reach) {
         }
     }
   openvdb::tools::dilateActiveValues(rims, reach, openvdb::tools::NN_FACE_EDGE, openvdb::tools::IGNORE_TILES);
+  rims.topologyUnion(*voxels.weight);
+  check_lattice_bytes(lattice_bytes(static_cast<std::int64_t>(rims.leafCount()),
+                                    static_cast<std::int64_t>(rims.activeVoxelCount())),
+                      most_bytes, voxels.voxel_size);
   for (const auto& tree : {voxels.distance, voxels.weight, voxels.views}) tree->topologyUnion(rims);
 }
 
@@ -139,10 +144,7 @@ void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads
 
 void fill_unseen(DistanceField::Voxels& voxels, double hole_size, std::int64_t most_bytes, int threads) {
   if (!(hole_size > 0)) return;
-  grow_at_rims(voxels, static_cast<int>(std::ceil(hole_size / 2)) + 1);
-  check_lattice_bytes(lattice_bytes(static_cast<std::int64_t>(voxels.weight->leafCount()),
-                                    static_cast<std::int64_t>(voxels.weight->activeVoxelCount())),
-                      most_bytes, voxels.voxel_size);
+  grow_at_rims(voxels, static_cast<int>(std::ceil(hole_size / 2)) + 1, most_bytes);
   const Unknowns unseen = find_unknowns(
       voxels, [](float weight) { return !(weight > 0); }, [](float weight) { return weight > 0; }, threads);
   std::vector<float> now(unseen.places.size()), next(now.size());
