@@ -25,6 +25,7 @@ struct DepthCommandOptions {
   std::optional<std::string> dataset;
   bool from_volume = false;
   DepthStageOptions stage;
+  MemoryOptions memory;
   CommonOptions common;
 };
 
@@ -40,6 +41,7 @@ OptionTable<DepthCommandOptions> depth_table() {
           "March through the volume again; else only where the run has no depth maps, or others than "
           "--depth-estimate and --depth-weight ask for");
   table.include(depth_option_table(), &DepthCommandOptions::stage);
+  table.include(memory_option_table(), &DepthCommandOptions::memory);
   table.include(common_option_table(), &DepthCommandOptions::common);
   return table;
 }
@@ -109,8 +111,7 @@ nlohmann::ordered_json new_summary(const FinishedRun& run, const DepthStageFigur
     if (const std::string name = stage.value("name", "");
         name != kPropagationStage && name != kRefinementStage)
       stages.push_back(stage);
-  for (const StageRecord& r : records)
-    stages.push_back({{"name", r.name}, {"seconds", r.seconds}, {"peak_memory_bytes", r.peak_memory_bytes}});
+  for (const StageRecord& r : records) stages.push_back(to_json(r));
   summary["stages"] = stages;
   for (const auto& [name, value] : options.items()) summary["options"][name] = value;
   summary["depth"] = to_json(figures);
@@ -132,9 +133,9 @@ int run_depth(const Invocation& invocation, const DepthCommandOptions& options) 
     begin = 0.3;
     march(run, input, options.stage.map, results.path(), session.context(), begin);
   }
-  const DepthStageFigures figures =
-      refine_depth_files(input.dataset, input.load, {run.file.info.exposure, voxel_size},
-                         {results.path(), run.path}, options.stage, session.context(), begin, 1);
+  const DepthStageFigures figures = refine_depth_files(
+      input.dataset, input.load, {run.file.info.exposure, voxel_size},
+      {{results.path(), run.path}, options.memory.memory}, options.stage, session.context(), begin, 1);
   session.context().throw_if_cancelled();
   if ((options.stage.bp || options.stage.refine) && figures.propagation.pixels + figures.refined_pixels == 0)
     throw_invalid((run.path / "depth").string(), "no pixel with depth in any view",

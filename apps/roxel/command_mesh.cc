@@ -22,6 +22,7 @@ struct SourceOptions {
 struct MeshCommandOptions {
   SourceOptions source;
   MeshOptions mesh;
+  MemoryOptions memory;
   CommonOptions common;
 };
 
@@ -39,6 +40,7 @@ OptionTable<MeshCommandOptions> mesh_table() {
   OptionTable<MeshCommandOptions> table;
   table.include(source_table(), &MeshCommandOptions::source);
   table.include(mesh_option_table(), &MeshCommandOptions::mesh);
+  table.include(memory_option_table(), &MeshCommandOptions::memory);
   table.include(common_option_table(), &MeshCommandOptions::common);
   return table;
 }
@@ -63,7 +65,8 @@ int run_mesh(const Invocation& invocation, const MeshCommandOptions& options) {
   if (!own_folder) protect_sources(target, {{run.path}, &input.dataset});
   const OutputFolder folder(target);
   PartialResults partial(folder.path());
-  const MeshInput source{input.dataset, input.load, run.file.volume, run.file.info, box_of(run), run.path};
+  const MeshInput source{input.dataset, input.load, run.file.volume,      run.file.info,
+                         box_of(run),   run.path,   options.memory.memory};
   MeshResult result = make_mesh(source, options.mesh, partial.path(), session.context());
   result.figures["options"] = mesh_option_table().to_json(options.mesh);
   const std::string figures = json_text(result.figures);
@@ -72,10 +75,7 @@ int run_mesh(const Invocation& invocation, const MeshCommandOptions& options) {
   } else {
     write_text_atomically(partial.path() / "mesh.json", figures + "\n");
   }
-  partial.publish([&] {
-    std::error_code ignored;
-    for (const std::string& name : mesh_files()) fs::remove(target / name, ignored);
-  });
+  partial.publish_over(mesh_files());
   for (const std::string& warning : result.warnings) warn(options.common, warning);
   session.display().clear();
   print_result(options.common, result.text + "written to " + target.string() + "\n", figures);

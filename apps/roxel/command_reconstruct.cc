@@ -12,6 +12,7 @@
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
 #include "roxel/base/parallel.h"
+#include "roxel/base/peak_memory.h"
 #include "roxel/eval/volume_accuracy.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/voxels_ply.h"
@@ -29,20 +30,22 @@ constexpr double kVolumeWritten = 0.52;
 constexpr double kViewsWritten = 0.58;
 constexpr double kDepthRefined = 0.85;
 
-/// Times the stages of a run one after the other.
+/// Time and memory of a run's stages, one after the other.
 class Stopwatch {
  public:
-  double lap() {
+  StageRecord lap(const std::string& name = "") {
     const auto now = Clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
+    const StageRecord record{name, std::chrono::duration<double>(now - last_).count(), memory_.bytes()};
     last_ = now;
-    return seconds;
+    memory_.restart();
+    return record;
   }
   double total() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
  private:
   using Clock = std::chrono::steady_clock;
   Clock::time_point start_ = Clock::now(), last_ = start_;
+  PeakMemory memory_;
 };
 
 /// The volume to start from; its colours must be in the space that this run compares colours in.
@@ -191,6 +194,8 @@ class Run {
     skies_.add_to(hooks, run_, checkpoints);
     hooks.after_survey = [&](const Scene& scene) {
       for (const std::string& warning : scene.warnings) warn(options_.common, warning);
+      if (options_.stages.depth && options_.stages.mesh)
+        check_mesh_voxel_size(options_.mesh, scene.voxel_size);
     };
     hooks.after_pass = [&](const PassRecord& record) {
       session_.display().line(pass_text(record, options_.reconstruct));
@@ -252,8 +257,8 @@ class Run {
   void refine_depth(const std::filesystem::path& results) {
     if (!options_.stages.depth || !(options_.depth.bp || options_.depth.refine)) return;
     refined_ = refine_depth_files(input_.dataset, input_.load, {made_.scene.exposure, made_.scene.voxel_size},
-                                  {results, results}, options_.depth, session_.context(), kViewsWritten,
-                                  kDepthRefined);
+                                  {{results, results}, options_.reconstruct.memory}, options_.depth,
+                                  session_.context(), kViewsWritten, kDepthRefined);
     for (const StageRecord& record : stage_records(*refined_)) made_.summary.stages.push_back(record);
     for (ReportView& view : report_views_)
       add_refined_pictures(read_depth(depth_path(results, view.name)), made_.scene.voxel_size, view);
@@ -280,9 +285,7 @@ class Run {
     }
   }
 
-  void add_stage(const char* name) {
-    made_.summary.stages.push_back({name, stopwatch_.lap(), peak_memory_bytes()});
-  }
+  void add_stage(const char* name) { made_.summary.stages.push_back(stopwatch_.lap(name)); }
 
   VolumeInfo volume_info() const {
     VolumeInfo info;
@@ -326,7 +329,7 @@ class Run {
 
   nlohmann::ordered_json summary_so_far() {
     made_.summary.seconds = seconds_before_ + stopwatch_.total();
-    made_.summary.peak_memory_bytes = peak_memory_bytes();
+    made_.summary.peak_memory_bytes = std::max(made_.summary.peak_memory_bytes, peak_memory_bytes());
     nlohmann::ordered_json json = to_json(make_record(session_.context().thread_count()));
     if (refined_) json["depth"] = to_json(*refined_);
     return json;

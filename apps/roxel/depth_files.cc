@@ -6,16 +6,20 @@
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
 #include "roxel/base/parallel.h"
+#include "roxel/base/peak_memory.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
+#include "run_input.h"
 
 namespace roxel::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
+
+constexpr int kHeldShare = 2;  ///< views that refinement holds take one part in so many of what is left
 
 constexpr std::array<const char*, 3> kPlaneChannels{"W", "W.u", "W.v"};
 
@@ -108,21 +112,21 @@ double mean(double sum, std::int64_t count) { return count > 0 ? sum / static_ca
 }  // namespace
 
 DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoader& load,
-                                     const DepthScene& scene, const DepthFolders& folders,
+                                     const DepthScene& scene, const DepthWork& work,
                                      const DepthStageOptions& options, RunContext& context,
                                      double progress_begin, double progress_end) {
-  const KeptPlanes kept(folders.results, dataset);
+  const fs::path& results = work.folders.results;
+  const KeptPlanes kept(results, dataset);
   DepthFiles files;
   files.read = [&](int v) {
-    DepthLayers layers = read_layers(folders, dataset.views[v]);
+    DepthLayers layers = read_layers(work.folders, dataset.views[v]);
     if (!options.bp) layers.depth_bp = layers.variance_bp = {};  // of an earlier time
     layers.depth_refined = layers.variance_refined = layers.normal = {};
     return layers;
   };
   files.write = [&](int v, const DepthLayers& layers) {
-    write_depth(depth_path(folders.results, dataset.views[v].name), layers);
-    if (!options.refine || !layers.depth_refined.empty())
-      write_picture(folders.results, dataset.views[v], layers);
+    write_depth(depth_path(results, dataset.views[v].name), layers);
+    if (!options.refine || !layers.depth_refined.empty()) write_picture(results, dataset.views[v], layers);
   };
   files.keep = [&](int v, const RefinedView& view) { kept.keep(v, view); };
   files.recall = [&](int v) { return kept.recall(v); };
@@ -132,8 +136,9 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
   const double middle = options.bp ? progress_begin + 0.15 * (progress_end - progress_begin) : progress_begin;
   DepthStageFigures figures;
   if (options.bp) {
+    const PeakMemory memory;
     figures = run_depth_stage(dataset, load, scene, files, first, context, progress_begin, middle);
-    figures.propagate_peak_bytes = peak_memory_bytes();
+    figures.propagate_peak_bytes = memory.bytes();
   }
   if (!options.bp && !options.refine)
     parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
@@ -141,8 +146,11 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
       files.write(static_cast<int>(v), files.read(static_cast<int>(v)));  // without what was added before
     });
   if (options.refine) {
+    const PeakMemory memory;
+    files.most_held_bytes =
+        std::min<std::size_t>(files.most_held_bytes, bytes_left(work.memory) / kHeldShare);
     figures.add(run_depth_stage(dataset, load, scene, files, second, context, middle, progress_end));
-    figures.refine_peak_bytes = peak_memory_bytes();
+    figures.refine_peak_bytes = memory.bytes();
   }
   return figures;
 }

@@ -20,10 +20,15 @@ struct DepthFolders {
   std::filesystem::path earlier;  ///< read from where `results` has none; may be the same
 };
 
+struct DepthWork {
+  DepthFolders folders;
+  std::optional<double> memory;  ///< GiB that the process may hold; none: what the machine has at hand
+};
+
 /// Adds the layers to every view's depth map, and shows the best of them in depth/NAME.png. Throws
 /// InvalidInput for missing or broken depth maps.
 DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoader& load,
-                                     const DepthScene& scene, const DepthFolders& folders,
+                                     const DepthScene& scene, const DepthWork& work,
                                      const DepthStageOptions& options, RunContext& context,
                                      double progress_begin, double progress_end);
 

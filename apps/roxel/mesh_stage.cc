@@ -7,6 +7,7 @@
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
+#include "roxel/base/peak_memory.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_bytes.h"
 #include "roxel/io/image_file.h"
@@ -14,13 +15,13 @@
 #include "roxel/io/textured_file.h"
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
-#include "roxel/solve/memory_plan.h"
 #include "roxel/solve/summary.h"
 #include "roxel/surface/depth_fusion.h"
 #include "roxel/surface/mesh_picture.h"
 #include "roxel/surface/simplification.h"
 #include "roxel/surface/surface_extraction.h"
 #include "roxel/surface/volume_colors.h"
+#include "run_input.h"
 
 namespace roxel::cli {
 namespace {
@@ -59,7 +60,7 @@ class MeshStage {
         voxel_size_(options.voxel_size.value_or(input.volume.index(0).frame().voxel_size / 2)) {}
 
   MeshResult make() {
-    check_voxel_size();
+    check_mesh_voxel_size(options_, input_.volume.index(0).frame().voxel_size);
     find_depth();
     fuse_and_extract();
     simplify();
@@ -84,23 +85,15 @@ class MeshStage {
 
   void lap(const char* name, double fraction) {
     const auto now = Clock::now();
-    stages_.push_back({{"name", name},
-                       {"seconds", std::chrono::duration<double>(now - last_).count()},
-                       {"peak_memory_bytes", peak_memory_bytes()}});
+    stages_.push_back(
+        to_json(StageRecord{name, std::chrono::duration<double>(now - last_).count(), memory_.bytes()}));
+    memory_.restart();
     last_ = now;
     Progress progress;
     progress.stage = "mesh";
     progress.fraction = input_.progress_begin + fraction * (input_.progress_end - input_.progress_begin);
     context_.report(progress);
     context_.throw_if_cancelled();
-  }
-
-  /// A lattice much finer than the volume costs memory and shows nothing more: taken for a mistake.
-  void check_voxel_size() const {
-    const double least = input_.volume.index(0).frame().voxel_size / 16;
-    if (voxel_size_ < least)
-      throw_invalid("--mesh-voxel-size", formatted("%g", voxel_size_),
-                    formatted("at least %g, a sixteenth of the volume's voxels", least));
   }
 
   void find_depth() {
@@ -121,7 +114,7 @@ class MeshStage {
     fusion.band = options_.band;
     fusion.hole_size = options_.hole_size;
     fusion.smooth = options_.smooth;
-    fusion.most_bytes = bytes_left();
+    fusion.most_bytes = bytes_left(input_.memory);
     const FusionViewLoader load = [&](int v) {
       const View& view = input_.dataset.views[with_depth_[v]];
       return read_fusion_view(depth_path(input_.depth_run, view.name), view);
@@ -152,13 +145,6 @@ class MeshStage {
     } catch (const InvalidInput& error) {
       throw InvalidInput(depth_folder() + ": " + error.what());
     }
-  }
-
-  /// For the lattice.
-  std::int64_t bytes_left() const {
-    double left = memory_at_hand();
-    if (input_.memory) left = std::min(left, *input_.memory * (std::int64_t{1} << 30) - resident_bytes());
-    return static_cast<std::int64_t>(std::max(0.0, std::min(left, 1e15)));
   }
 
   std::string depth_folder() const { return (input_.depth_run / "depth").string(); }
@@ -326,6 +312,7 @@ class MeshStage {
   Surface surface_;
   std::optional<TexturedSurface> textured_;
   Clock::time_point last_ = Clock::now();
+  PeakMemory memory_;
   nlohmann::ordered_json stages_ = nlohmann::ordered_json::array();
   MeshResult out_;
 };
@@ -399,6 +386,13 @@ OptionTable<MeshOptions> make_mesh_table() {
 std::vector<std::string> mesh_files() {
   return {"mesh.ply", "mesh.glb", "mesh.obj",       "mesh.mtl",
           "mesh.png", "mesh.jpg", "mesh_views.png", "mesh_turntable.jpg"};
+}
+
+void check_mesh_voxel_size(const MeshOptions& options, double volume_voxel_size) {
+  const double least = volume_voxel_size / 16;
+  if (options.voxel_size && *options.voxel_size < least)
+    throw_invalid("--mesh-voxel-size", formatted("%g", *options.voxel_size),
+                  formatted("at least %g, a sixteenth of the volume's voxels", least));
 }
 
 MeshResult make_mesh(const MeshInput& input, const MeshOptions& options, const fs::path& results,

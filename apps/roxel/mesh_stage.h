@@ -59,6 +59,10 @@ inline constexpr int kMeshSheetWidth = 980;  ///< of mesh_views.png, pixels
 /// The files of a mesh in the folder of a run, whether they are there or not.
 std::vector<std::string> mesh_files();
 
+/// A lattice much finer than the volume costs memory and shows nothing more: taken for a mistake. Throws
+/// InvalidInput.
+void check_mesh_voxel_size(const MeshOptions& options, double volume_voxel_size);
+
 /// Writes them below `results` (see mesh_files). Throws InvalidInput where there is no depth, no surface, or
 /// the target cannot be reached; IoError; Cancelled.
 MeshResult make_mesh(const MeshInput& input, const MeshOptions& options, const std::filesystem::path& results,

@@ -135,8 +135,7 @@ std::vector<fs::path> PartialResults::files() const {
   return found;
 }
 
-void PartialResults::publish(const std::function<void()>& remove_older) {
-  const std::vector<fs::path> names = files();
+void PartialResults::make_way(const std::vector<fs::path>& names) const {
   for (const fs::path& name : names) {
     const fs::path to = target_ / name;
     std::error_code error;
@@ -144,11 +143,29 @@ void PartialResults::publish(const std::function<void()>& remove_older) {
     if (error) throw IoError(to.parent_path().string() + ": cannot be made: " + error.message());
     if (fs::is_directory(to)) throw IoError(to.string() + ": cannot be written (it is a folder)");
   }
-  remove_older();
+}
+
+void PartialResults::move_all(const std::vector<fs::path>& names) const {
   for (const fs::path& name : names) {
-    fs::create_directories((target_ / name).parent_path());  // where it went with the older files
+    fs::create_directories((target_ / name).parent_path());  // where it went with older files
     move_file(path_ / name, target_ / name);
   }
+}
+
+void PartialResults::publish(const std::function<void()>& remove_older) {
+  const std::vector<fs::path> names = files();
+  make_way(names);
+  remove_older();
+  move_all(names);
+}
+
+void PartialResults::publish_over(const std::vector<std::string>& older) {
+  const std::vector<fs::path> names = files();
+  make_way(names);
+  move_all(names);
+  std::error_code ignored;
+  for (const std::string& name : older)
+    if (std::find(names.begin(), names.end(), name) == names.end()) fs::remove(target_ / name, ignored);
 }
 
 }  // namespace roxel::cli

@@ -50,9 +50,14 @@ class PartialResults {
   /// Calls remove_older() and moves all files to the target, summary.json last. Throws IoError before that
   /// where something is in their way.
   void publish(const std::function<void()>& remove_older = [] {});
+  /// Moves all files over those that there are, summary.json last, and then removes those of the `older` ones
+  /// in whose place none has come: whatever fails on the way, no file is lost before there is a new one.
+  void publish_over(const std::vector<std::string>& older);
 
  private:
   std::vector<std::filesystem::path> files() const;
+  void make_way(const std::vector<std::filesystem::path>& names) const;
+  void move_all(const std::vector<std::filesystem::path>& names) const;
 
   std::filesystem::path target_, path_;
 };

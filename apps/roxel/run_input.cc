@@ -1,6 +1,7 @@
 #include "run_input.h"
 
 #include "roxel/base/error.h"
+#include "roxel/solve/memory_plan.h"
 
 namespace roxel::cli {
 
@@ -12,6 +13,29 @@ Input read_input_of(const FinishedRun& run, const std::optional<std::string>& da
         run.path.string(), "a run whose data set \"" + path + "\" is not there",
         "photographs where the run has read them, or --dataset DATASET for roxel depth and roxel mesh");
   return read_input(path, input_options_of(run), session);
+}
+
+const OptionTable<MemoryOptions>& memory_option_table() {
+  static const OptionTable<MemoryOptions> table = [] {
+    OptionTable<MemoryOptions> made;
+    made.group("Memory");
+    made.add("memory", &MemoryOptions::memory)
+        .help(
+            "Keep to this much memory: fewer views are held at once, and a surface whose lattice does not "
+            "fit "
+            "is an error; results are the same")
+        .unit("GiB")
+        .above(0)
+        .unset("what the machine has at hand");
+    return made;
+  }();
+  return table;
+}
+
+std::int64_t bytes_left(const std::optional<double>& memory) {
+  double left = memory_at_hand();
+  if (memory) left = std::min(left, *memory * (std::int64_t{1} << 30) - resident_bytes());
+  return static_cast<std::int64_t>(std::clamp(left, 0.0, 1e15));
 }
 
 Eigen::AlignedBox3d box_of(const FinishedRun& run) {

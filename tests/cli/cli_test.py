@@ -315,7 +315,7 @@ def numbers(summary):
     kept = json.loads(json.dumps(kept))
     for record in kept["levels"] + kept["passes"]:
         for key in list(record):
-            if "seconds" in key or key == "ns_per_step":
+            if "seconds" in key or key in ("ns_per_step", "peak_memory_bytes"):
                 del record[key]
     return kept
 
@@ -386,6 +386,13 @@ class Depth(Case):
         self.assertLess(again["depth"]["bp"]["mean_variance_after"], again["depth"]["bp"]["mean_variance_before"])
         self.assertGreater(again["depth"]["refined"]["matched_pixels"], 100)
         self.assertFalse(any(name.startswith(".") for name in files_below(out)), files_below(out))
+
+    def test_memory_changes_no_map_and_is_no_part_of_a_run(self):
+        out, _ = self.reconstruct("held", "--no-render", "--no-report")
+        known = self.maps(out)
+        self.succeed("depth", out, "--memory", "0.01", "--quiet")
+        self.assertEqual(known, self.maps(out))
+        self.expect_error(2, "--memory", "depth", out, "--memory", "0")
 
     def test_the_runs_own_light_holds_when_its_volume_is_marched_through_again(self):
         out, summary = self.reconstruct("lit", "--no-render", "--illumination", "gain", "--matching", "local")

@@ -16,8 +16,7 @@
 namespace roxel {
 namespace {
 
-constexpr std::size_t kCachedBytes = std::size_t{1} << 30;  ///< of views beside the one that is worked on
-constexpr double kMostVoxels = 0.8;                         ///< of a depth's deviation, as refinement sees it
+constexpr double kMostVoxels = 0.8;    ///< of a depth's deviation, as refinement sees it
 constexpr double kUnconfirmed = 1;     ///< voxels that a depth may move by which no other view sees there
 constexpr double kAnotherSurface = 3;  ///< voxels beyond which a smaller view's pixel saw another surface
 constexpr int kSampleStride = 8;       ///< at most: pixels between samples that sources are chosen by
@@ -56,7 +55,8 @@ template <class Value>
 class ViewCache {
  public:
   using Load = std::function<Value(int view_idx)>;
-  ViewCache(Load load, std::size_t bytes_a_pixel) : load_(std::move(load)), bytes_a_pixel_(bytes_a_pixel) {}
+  ViewCache(Load load, std::size_t bytes_a_pixel, std::size_t most_bytes)
+      : load_(std::move(load)), bytes_a_pixel_(bytes_a_pixel), most_bytes_(most_bytes) {}
 
   /// Those views, in that order; missing ones are loaded by all threads.
   std::vector<std::shared_ptr<const Value>> get(const std::vector<int>& views, const Dataset& dataset,
@@ -80,7 +80,7 @@ class ViewCache {
       entries_[views[i]].used = ++clock_;
       out[i] = entries_[views[i]].value;
     }
-    while (bytes_ > kCachedBytes && entries_.size() > views.size()) {
+    while (bytes_ > most_bytes_ && entries_.size() > views.size()) {
       const auto oldest =
           std::min_element(entries_.begin(), entries_.end(),
                            [](const auto& a, const auto& b) { return a.second.used < b.second.used; });
@@ -97,7 +97,7 @@ class ViewCache {
     std::int64_t used = 0;
   };
   Load load_;
-  std::size_t bytes_a_pixel_;
+  std::size_t bytes_a_pixel_, most_bytes_;
   std::map<int, Entry> entries_;
   std::size_t bytes_ = 0;
   std::int64_t clock_ = 0;
@@ -166,7 +166,7 @@ class DepthStage {
 
   /// Refines each view by itself; returns what each was matched with. Views are held only while it runs.
   std::vector<std::vector<int>> match_all() {
-    ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24);
+    ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24, files_.most_held_bytes);
     std::vector<std::vector<int>> sources(count_);
     Aside writing(context_.thread_count() > 1);
     for (int v = 0; v < count_; ++v) {
@@ -182,7 +182,7 @@ class DepthStage {
     set_scale();
     const std::vector<std::vector<int>> sources = match_all();
     Aside writing(context_.thread_count() > 1);
-    ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 24);
+    ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 24, files_.most_held_bytes);
     for (int v = 0; v < count_; ++v) {
       agree_one(v, sources[v], refined, writing);
       report("refining depth", 1);

@@ -43,6 +43,8 @@ struct DepthFiles {
   std::function<void(int view_idx, const DepthLayers&)> write;
   std::function<void(int view_idx, const RefinedView&)> keep;  ///< until the stage is over
   std::function<RefinedView(int view_idx)> recall;
+  /// Of views that are held rather than made again, beside those that are worked on. Changes no result.
+  std::size_t most_held_bytes = std::size_t{1} << 30;
 };
 
 /// What a stage did, and what it cost.
@@ -54,7 +56,8 @@ struct DepthStageFigures {
   std::int64_t agreed_pixels = 0;   ///< that another view agrees with
   double pixels = 0;                ///< of all images
   double propagate_seconds = 0, refine_seconds = 0;
-  std::int64_t propagate_peak_bytes = 0, refine_peak_bytes = 0;  ///< of the process; filled by who runs it
+  std::int64_t propagate_peak_bytes = 0,
+               refine_peak_bytes = 0;  ///< resident meanwhile; filled by who runs it
 
   /// Of another part of the stage, over the same views.
   void add(const DepthStageFigures& other);

@@ -42,9 +42,14 @@ class DepthStage : public ::testing::Test {
 
   DepthStageFigures run() {
     refined_.resize(layers_.size());
-    const DepthFiles files{
-        [&](int v) { return layers_[v]; }, [&](int v, const DepthLayers& layers) { layers_[v] = layers; },
-        [&](int v, const RefinedView& view) { refined_[v] = view; }, [&](int v) { return refined_[v]; }};
+    DepthFiles files{[&](int v) {
+                       ++reads_;
+                       return layers_[v];
+                     },
+                     [&](int v, const DepthLayers& layers) { layers_[v] = layers; },
+                     [&](int v, const RefinedView& view) { refined_[v] = view; },
+                     [&](int v) { return refined_[v]; }};
+    files.most_held_bytes = most_held_bytes_;
     RunContext context(1);
     return run_depth_stage(
         dataset_, [&](const View& view) { return photographs_.at(view.name); }, {1, kStageVoxel}, files,
@@ -73,7 +78,28 @@ class DepthStage : public ::testing::Test {
   std::vector<DepthLayers> layers_;
   std::vector<RefinedView> refined_;
   DepthStageOptions options_;
+  std::size_t most_held_bytes_ = DepthFiles{}.most_held_bytes;
+  int reads_ = 0;  ///< of depth maps
 };
+
+TEST_F(DepthStage, ViewsThatAreNotHeldAreReadAgainAndNothingElseChanges) {
+  const std::vector<DepthLayers> before = layers_;
+  run();
+  const int once = reads_;
+  const Image held = layers_[0].depth_refined;
+  layers_ = before;
+  options_.refine_views = 2;
+  run();
+  const int few = reads_ - once;
+  const Image few_held = layers_[0].depth_refined;
+  layers_ = before;
+  most_held_bytes_ = 0;
+  run();
+  EXPECT_EQ(few, once);
+  EXPECT_GT(reads_ - once - few, few);
+  EXPECT_EQ(layers_[0].depth_refined.data(), few_held.data());
+  EXPECT_NE(held.data(), few_held.data());
+}
 
 TEST_F(DepthStage, RefinesAllPixelsFromViewsMadeSmaller) {
   const double before = median_error(layers_[0].depth);

@@ -7,6 +7,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/kernel.h"
+#include "roxel/base/zeroed_floats.h"
 
 namespace roxel {
 namespace {
@@ -24,22 +25,25 @@ void check(const GaussianLattice& field) {
 }
 
 /// What a row of pixels of one colour reads and writes, side by side in memory.
-struct Firing {
+struct RowOfPixels {
   const float *precision, *weighted;           ///< evidence, and precision x mean
   const float *tie_l, *tie_r, *tie_u, *tie_d;  ///< precisions of the four ties
   const float *step_l, *step_r, *step_u, *step_d;
   float *p_l, *p_r, *p_u, *p_d;  ///< messages: precision
   float *h_l, *h_r, *h_u, *h_d;  ///< precision x mean
+  float *sure, *mean, *moved;    ///< beliefs, and the largest square movement, in variances
 };
 
 /// Reads the messages to n pixels and replaces them by those that the pixels send:
 /// precision 1 / (1 / tie + 1 / P), mean H / P + step, where P and H leave the receiver's own message out.
-ROXEL_KERNEL void fire(const Firing& f, int n) {
+/// No two of the arrays overlap.
+ROXEL_KERNEL void fire(const RowOfPixels& f, int n) {
   const float* __restrict precision = f.precision, * __restrict weighted = f.weighted;
   const float* __restrict tie_l = f.tie_l, * __restrict tie_r = f.tie_r, * __restrict tie_u = f.tie_u, * __restrict tie_d = f.tie_d;
   const float* __restrict step_l = f.step_l, * __restrict step_r = f.step_r, * __restrict step_u = f.step_u, * __restrict step_d = f.step_d;
   float* __restrict p_l = f.p_l, * __restrict p_r = f.p_r, * __restrict p_u = f.p_u, * __restrict p_d = f.p_d;
   float* __restrict h_l = f.h_l, * __restrict h_r = f.h_r, * __restrict h_u = f.h_u, * __restrict h_d = f.h_d;
+#pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
     const float p_lr = precision[i] + p_l[i] + p_r[i], h_lr = weighted[i] + h_l[i] + h_r[i];
     const float p_ud = precision[i] + p_u[i] + p_d[i], h_ud = weighted[i] + h_u[i] + h_d[i];
@@ -59,23 +63,75 @@ ROXEL_KERNEL void fire(const Firing& f, int n) {
   }
 }
 
+/// What n pixels that are about to fire believe (`nothing`: no message has reached them), and the square of
+/// what their mean has moved by since it was last read.
+ROXEL_KERNEL void believe(const RowOfPixels& f, float nothing, int n) {
+  const float* __restrict precision = f.precision, * __restrict weighted = f.weighted;
+  const float* __restrict p_l = f.p_l, * __restrict p_r = f.p_r, * __restrict p_u = f.p_u, * __restrict p_d = f.p_d;
+  const float* __restrict h_l = f.h_l, * __restrict h_r = f.h_r, * __restrict h_u = f.h_u, * __restrict h_d = f.h_d;
+  float* __restrict sure = f.sure, * __restrict mean = f.mean, * __restrict moved = f.moved;
+#pragma GCC ivdep
+  for (int i = 0; i < n; ++i) {
+    const float p = precision[i] + p_r[i] + p_d[i] + p_u[i] + p_l[i];
+    const float h = weighted[i] + h_r[i] + h_d[i] + h_u[i] + h_l[i];
+    const float now = p > 0 ? h / p : nothing;
+    const float by = now - mean[i], square = by * by * p;
+    moved[i] = square > moved[i] ? square : moved[i];
+    sure[i] = p;
+    mean[i] = now;
+  }
+}
+
+enum Plane {
+  kPrecision,
+  kWeighted,
+  kRight,
+  kDown,
+  kRightStep,
+  kDownStep,
+  kRightP,
+  kRightH,
+  kDownP,
+  kDownH,
+  kSure,
+  kMean,
+  kPlanes
+};
+
 /// Planes in which the even columns of a row stand before the odd ones, so that pixels of one colour, and
-/// their ties, lie side by side. Every row, and each of its halves, has a zero in front and kPadding behind.
+/// their ties, lie side by side; a row of all planes before the next row, so that what a row needs is near.
+/// All of it is 0 at first, and what is no column stays 0.
 ///
-///   row y:  0 | x = 0 2 4 ... | 0 ... | 0 | x = 1 3 5 ... | 0 ...
-class SplitPlane {
+///   row y of a plane:  0 ... 0 | x = 0 2 4 ... | 0 ... 0 | x = 1 3 5 ... |       each column's place: a
+///   multiple of 16
+class SplitPlanes {
  public:
-  SplitPlane(int width, int height)
-      : half_((width + 1) / 2 + 2), data_(static_cast<std::size_t>(2) * half_ * (height + 1)) {}
-  /// Columns of parity p in row y, which may be -1.
-  float* row(int y, int p) { return data_.data() + (static_cast<std::size_t>(2) * (y + 1) + p) * half_ + 1; }
-  const float* row(int y, int p) const { return const_cast<SplitPlane*>(this)->row(y, p); }
-  float& at(int x, int y) { return row(y, x & 1)[x >> 1]; }
-  float at(int x, int y) const { return row(y, x & 1)[x >> 1]; }
+  SplitPlanes(int width, int height)
+      : width_(width),
+        lines_(((width + 1) / 2 + kLine - 1) / kLine),
+        stride_(static_cast<std::size_t>((lines_ + 1) | 1) * kLine),
+        memory_(static_cast<std::size_t>(height + 1) * 2 * kPlanes * stride_) {}
+  /// Columns of a parity in row y, which may be -1.
+  float* row(Plane plane, int y, int parity) const {
+    const std::size_t before = (static_cast<std::size_t>(y + 1) * kPlanes + plane) * 2 + parity;
+    return memory_.data() + before * stride_ + kLine;
+  }
+  void set(Plane plane, int y, const float* values) {
+    for (int parity = 0; parity < 2; ++parity)
+      for (int x = parity; x < width_; x += 2) row(plane, y, parity)[x / 2] = values[x];
+  }
+  void get(Plane plane, int y, float* values) const {
+    for (int parity = 0; parity < 2; ++parity)
+      for (int x = parity; x < width_; x += 2) values[x] = row(plane, y, parity)[x / 2];
+  }
+  /// Places of a row's columns of one parity, those behind the last column included.
+  int places() const { return lines_ * kLine; }
 
  private:
-  std::size_t half_;
-  std::vector<float> data_;
+  static constexpr int kLine = ZeroedFloats::kLine;
+  int width_, lines_;
+  std::size_t stride_;  ///< odd in lines: rows of planes that are read together do not push each other out
+  ZeroedFloats memory_;
 };
 
 /// The synchronous schedule, one message a tie at any time.
@@ -85,66 +141,59 @@ class Sweeper {
       : width_(field.width),
         height_(field.height),
         origin_(middle(field)),
-        precision_(plane()),
-        weighted_(plane()),
-        right_(plane()),
-        down_(plane()),
-        right_step_(plane()),
-        down_step_(plane()),
-        right_p_(plane()),
-        right_h_(plane()),
-        down_p_(plane()),
-        down_h_(plane()) {
-    for (int y = 0; y < height_; ++y)
+        planes_(width_, height_),
+        moved_(planes_.places()),
+        before_(planes_.places()) {
+    std::vector<float> weighted(width_);
+    const std::vector<float> depth_0(width_, -origin());
+    for (int y = 0; y < height_; ++y) {
+      const std::size_t row = static_cast<std::size_t>(y) * width_;
       for (int x = 0; x < width_; ++x) {
-        const std::size_t i = static_cast<std::size_t>(y) * width_ + x;
-        precision_.at(x, y) = field.precision[i];
-        weighted_.at(x, y) =
-            field.precision[i] > 0 ? static_cast<float>(field.precision[i] * (field.mean[i] - origin_)) : 0;
-        right_.at(x, y) = field.right[i];
-        down_.at(x, y) = field.down[i];
-        if (field.right_step.empty()) continue;
-        right_step_.at(x, y) = field.right_step[i];
-        down_step_.at(x, y) = field.down_step[i];
+        const float p = field.precision[row + x];
+        weighted[x] = p > 0 ? static_cast<float>(p * (field.mean[row + x] - origin_)) : 0;
       }
+      planes_.set(kPrecision, y, &field.precision[row]);
+      planes_.set(kWeighted, y, weighted.data());
+      planes_.set(kMean, y, depth_0.data());
+      planes_.set(kRight, y, &field.right[row]);
+      planes_.set(kDown, y, &field.down[row]);
+      if (field.right_step.empty()) continue;
+      planes_.set(kRightStep, y, &field.right_step[row]);
+      planes_.set(kDownStep, y, &field.down_step[row]);
+    }
   }
 
-  /// Lets red (0) and black (1) pixels fire in turn, `sweeps` times. Row y fires for the t-th time once its
-  /// neighbours have fired t - 1 times: all sweeps pass over the image in one go, a row behind each other.
-  void sweep(int sweeps) {
+  /// Lets red (0) and black (1) pixels fire in turn, `sweeps` times, and says by how many deviations of its
+  /// belief the last sweep has moved a mean. Row y fires for the t-th time once its neighbours have fired
+  /// t - 1 times: all sweeps pass over the image in one go, a row behind each other. Beliefs are read just
+  /// before a pixel fires, when all messages to it are there: black ones, then red ones as if they were to
+  /// fire once more; and those of the sweep before, to see how far they move.
+  double sweep(int sweeps) {
     const int halves = 2 * sweeps;
-    for (int front = 0; front < height_ + halves - 1; ++front)
-      for (int half = std::max(0, front - height_ + 1); half < halves && half <= front; ++half)
-        fire_row(front - half, half & 1);
+    std::fill(moved_.begin(), moved_.end(), 0.0f);
+    for (int front = 0; front <= height_ - 1 + halves; ++front)
+      for (int half = std::max(0, front - height_ + 1); half <= halves && half <= front; ++half) {
+        RowOfPixels row = pixels(front - half, half & 1);
+        row.moved = half >= halves - 1 ? moved_.data() : before_.data();
+        if (half > 0 && half >= halves - 3) believe(row, -origin(), planes_.places());
+        if (half < halves) fire(row, planes_.places());
+      }
+    return std::sqrt(*std::max_element(moved_.begin(), moved_.end()));
   }
 
-  /// Beliefs of black pixels, which must be about to fire after red_only(), and of red ones after
-  /// black_only().
-  void red_only() {
-    for (int y = 0; y < height_; ++y) fire_row(y, 0);
-  }
-  void black_only() {
-    for (int y = 0; y < height_; ++y) fire_row(y, 1);
-  }
-  void read_beliefs(int color, LatticeBeliefs& out, bool track) const {
-    for (int y = 0; y < height_; ++y)
-      for (int x = (color + y) & 1; x < width_; x += 2) {
-        float p = precision_.at(x, y) + right_p_.at(x, y) + down_p_.at(x, y) + down_p_.at(x, y - 1);
-        float h = weighted_.at(x, y) + right_h_.at(x, y) + down_h_.at(x, y) + down_h_.at(x, y - 1);
-        if (x > 0) p += right_p_.at(x - 1, y), h += right_h_.at(x - 1, y);
-        const std::size_t i = static_cast<std::size_t>(y) * width_ + x;
-        const float mean = p > 0 ? static_cast<float>(h / p + origin_) : 0;
-        if (track && p > 0)
-          out.movement =
-              std::max(out.movement, std::abs(static_cast<double>(mean) - out.mean[i]) * std::sqrt(p));
-        out.mean[i] = mean;
-        out.precision[i] = p;
-      }
+  void write_beliefs(LatticeBeliefs& out) const {
+    out.mean.resize(static_cast<std::size_t>(width_) * height_);
+    out.precision.resize(out.mean.size());
+    for (int y = 0; y < height_; ++y) {
+      float* mean = &out.mean[static_cast<std::size_t>(y) * width_];
+      float* precision = &out.precision[static_cast<std::size_t>(y) * width_];
+      planes_.get(kMean, y, mean);
+      planes_.get(kSure, y, precision);
+      for (int x = 0; x < width_; ++x) mean[x] = precision[x] > 0 ? static_cast<float>(mean[x] + origin_) : 0;
+    }
   }
 
  private:
-  SplitPlane plane() const { return SplitPlane(width_, height_); }
-
   /// Floats keep more of what is near zero.
   static double middle(const GaussianLattice& field) {
     double sum = 0;
@@ -154,54 +203,44 @@ class Sweeper {
     return count > 0 ? sum / static_cast<double>(count) : 0;
   }
 
-  /// The array of left ties begins one pixel earlier: the tie left of an even column belongs to an odd one.
-  static std::size_t left_shift(int p) { return p == 0 ? 1 : 0; }
+  float origin() const { return static_cast<float>(origin_); }
 
-  void fire_row(int y, int color) {
-    const int p = (color + y) & 1;
-    const int n = (width_ + 1 - p) / 2;
-    const auto left = [&](auto& plane) { return plane.row(y, 1 - p) - left_shift(p); };
-    Firing f;
-    f.precision = precision_.row(y, p);
-    f.weighted = weighted_.row(y, p);
-    f.tie_l = left(right_), f.tie_r = right_.row(y, p), f.tie_u = down_.row(y - 1, p),
-    f.tie_d = down_.row(y, p);
-    f.step_l = left(right_step_), f.step_r = right_step_.row(y, p);
-    f.step_u = down_step_.row(y - 1, p), f.step_d = down_step_.row(y, p);
-    f.p_l = left(right_p_), f.p_r = right_p_.row(y, p), f.p_u = down_p_.row(y - 1, p),
-    f.p_d = down_p_.row(y, p);
-    f.h_l = left(right_h_), f.h_r = right_h_.row(y, p), f.h_u = down_h_.row(y - 1, p),
-    f.h_d = down_h_.row(y, p);
-    fire(f, n);
+  /// Pixels of one colour in row y. The ties to the left of even columns belong to the odd column before.
+  RowOfPixels pixels(int y, int color) {
+    const int own = (color + y) & 1;
+    const auto here = [&](Plane plane) { return planes_.row(plane, y, own); };
+    const auto left = [&](Plane plane) { return planes_.row(plane, y, 1 - own) - (own == 0 ? 1 : 0); };
+    const auto up = [&](Plane plane) { return planes_.row(plane, y - 1, own); };
+    RowOfPixels f;
+    f.precision = here(kPrecision), f.weighted = here(kWeighted);
+    f.tie_l = left(kRight), f.tie_r = here(kRight), f.tie_u = up(kDown), f.tie_d = here(kDown);
+    f.step_l = left(kRightStep), f.step_r = here(kRightStep);
+    f.step_u = up(kDownStep), f.step_d = here(kDownStep);
+    f.p_l = left(kRightP), f.p_r = here(kRightP), f.p_u = up(kDownP), f.p_d = here(kDownP);
+    f.h_l = left(kRightH), f.h_r = here(kRightH), f.h_u = up(kDownH), f.h_d = here(kDownH);
+    f.sure = here(kSure), f.mean = here(kMean), f.moved = nullptr;
+    return f;
   }
 
   int width_, height_;
   double origin_;
-  SplitPlane precision_, weighted_, right_, down_, right_step_, down_step_;
-  SplitPlane right_p_, right_h_, down_p_, down_h_;
+  SplitPlanes planes_;
+  std::vector<float> moved_;   ///< for each place in a row, the most of all rows
+  std::vector<float> before_;  ///< the same up to the last sweep but one, which nobody asks for
 };
 
 LatticeBeliefs propagate_synchronously(const GaussianLattice& field, const PropagationOptions& options,
                                        const std::function<void()>& stop) {
   LatticeBeliefs out;
-  out.mean.assign(field.mean.size(), 0);
-  out.precision.assign(field.mean.size(), 0);
   Sweeper sweeper(field);
   while (out.sweeps < options.sweeps) {
     stop();
-    // The last two sweeps of a round are done one by one, to see how far beliefs still move.
-    const int round = std::min(kSweepsAtOnce, options.sweeps - out.sweeps);
-    if (round > 2) sweeper.sweep(round - 2);
-    out.movement = 0;
-    for (int last = std::min(round, 2); last > 0; --last) {
-      sweeper.red_only();
-      sweeper.read_beliefs(1, out, last == 1);
-      sweeper.black_only();
-      sweeper.read_beliefs(0, out, last == 1);
-    }
-    out.sweeps += round;
-    if (round >= 2 && out.movement <= options.tolerance) break;
+    const int sweeps = std::min(kSweepsAtOnce, options.sweeps - out.sweeps);
+    out.movement = sweeper.sweep(sweeps);
+    out.sweeps += sweeps;
+    if (sweeps >= 2 && out.movement <= options.tolerance) break;
   }
+  sweeper.write_beliefs(out);
   return out;
 }
 

@@ -115,19 +115,35 @@ LatticeBeliefs plain_synchronous(const GaussianLattice& field, int times) {
 }
 
 TEST(GaussianLattice, ASweepIsTwoStepsOfTheSynchronousSchedule) {
-  const GaussianLattice field = random_lattice(13, 10, true, 3);
-  for (const int sweeps : {1, 2, 4, 5, 7, 12}) {
-    const LatticeBeliefs fast = propagate(field, {MessageSchedule::kSynchronous, sweeps, 0});
-    const LatticeBeliefs even = plain_synchronous(field, 2 * sweeps),
-                         odd = plain_synchronous(field, 2 * sweeps - 1);
-    ASSERT_EQ(fast.sweeps, sweeps);
-    for (int y = 0; y < field.height; ++y)
-      for (int x = 0; x < field.width; ++x) {
-        const int i = y * field.width + x;
-        const LatticeBeliefs& twin = (x + y) % 2 ? odd : even;
-        EXPECT_NEAR(fast.mean[i], twin.mean[i], 1e-4) << sweeps << " " << x << " " << y;
-        EXPECT_NEAR(fast.precision[i], twin.precision[i], 1e-4 * (1 + twin.precision[i]));
-      }
+  // Widths on both sides of a line of the cache, which holds 16 columns of one parity.
+  for (const auto& [width, height] : {std::pair{13, 10}, {31, 4}, {32, 4}, {33, 4}, {66, 3}, {1, 7}}) {
+    const GaussianLattice field = random_lattice(width, height, true, 3);
+    for (const int sweeps : {1, 2, 4, 5, 7, 12}) {
+      const LatticeBeliefs fast = propagate(field, {MessageSchedule::kSynchronous, sweeps, -1});
+      const LatticeBeliefs even = plain_synchronous(field, 2 * sweeps),
+                           odd = plain_synchronous(field, 2 * sweeps - 1);
+      ASSERT_EQ(fast.sweeps, sweeps);
+      for (int y = 0; y < field.height; ++y)
+        for (int x = 0; x < field.width; ++x) {
+          const int i = y * field.width + x;
+          const LatticeBeliefs& twin = (x + y) % 2 ? odd : even;
+          EXPECT_NEAR(fast.mean[i], twin.mean[i], 1e-4) << sweeps << " " << x << " " << y;
+          EXPECT_NEAR(fast.precision[i], twin.precision[i], 1e-4 * (1 + twin.precision[i]));
+        }
+    }
+  }
+}
+
+TEST(GaussianLattice, MovementIsThatOfTheLastSweep) {
+  const GaussianLattice field = random_lattice(21, 12, true, 5);
+  for (const int sweeps : {2, 3, 5, 6, 8}) {
+    const LatticeBeliefs last = propagate(field, {MessageSchedule::kSynchronous, sweeps, 0});
+    const LatticeBeliefs before = propagate(field, {MessageSchedule::kSynchronous, sweeps - 1, 0});
+    double most = 0;
+    for (std::size_t i = 0; i < last.mean.size(); ++i)
+      most = std::max(most, std::abs(double(last.mean[i]) - before.mean[i]) * std::sqrt(last.precision[i]));
+    EXPECT_GT(most, 1e-3);
+    EXPECT_NEAR(last.movement, most, 1e-5) << sweeps;  // floats of about 10, and precisions of about 10
   }
 }
 

@@ -17,12 +17,13 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PassRecord, level, pass, draft, active_voxels
                                    mean_log_likelihood, mean_opacity_change, mean_opacity, seconds,
                                    color_seconds, opacity_seconds, ns_per_step)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LightRecord, level, pass, fitted_views, largest_change, spread)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LevelRecord, voxel_size, voxels_in_box, voxels_around, converged, seconds)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(LevelRecord, voxel_size, voxels_in_box, voxels_around, converged, seconds,
+                                   peak_memory_bytes)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StageRecord, name, seconds, peak_memory_bytes)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Summary, termination, levels, passes, light, stages, notes, seconds,
                                    peak_memory_bytes)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PassState, level, passes, draft_passes, resting, light_rests, level_done,
-                                   light_from, level_seconds)
+                                   light_from, level_seconds, level_peak_bytes)
 
 namespace {
 

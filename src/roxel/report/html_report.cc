@@ -443,23 +443,23 @@ class Page {
 
   void cost() {
     heading("Cost");
-    std::vector<std::vector<std::string>> rows{{"stage", "time", "share"}};
+    std::vector<std::vector<std::string>> rows{{"stage", "time", "share", "peak memory"}};
     const double total = number(summary_, "seconds");
-    const auto row = [&](const std::string& name, double seconds) {
-      rows.push_back({name, duration(seconds), total > 0 ? percent(seconds / total) : ""});
+    const auto row = [&](const std::string& name, double seconds, const ordered_json& bytes) {
+      rows.push_back({name, duration(seconds), total > 0 ? percent(seconds / total) : "",
+                      bytes.is_number() ? formatted("%.0f MiB", bytes.get<double>() / 1024 / 1024) : ""});
     };
     int level = 0;
     const ordered_json &levels = at(summary_, "levels"), &stages = at(summary_, "stages");
     for (const auto& record : levels.is_array() ? levels : ordered_json::array())
       row("level " + std::to_string(++level) + ", voxels of " + text_of(at(record, "voxel_size")),
-          number(record, "seconds"));
+          number(record, "seconds"), at(record, "peak_memory_bytes"));
     for (const auto& stage : stages.is_array() ? stages : ordered_json::array())
-      row(text_of(at(stage, "name")), number(stage, "seconds"));
-    row("all", total);
+      row(text_of(at(stage, "name")), number(stage, "seconds"), at(stage, "peak_memory_bytes"));
+    row("all", total, at(summary_, "peak_memory_bytes"));
     out_ += table(rows);
-    if (at(summary_, "peak_memory_bytes").is_number())
-      out_ += formatted("<p>%.0f threads; peak memory %.0f MiB.</p>\n", number(summary_, "threads"),
-                        number(summary_, "peak_memory_bytes") / 1024 / 1024);
+    out_ += formatted("<p>%.0f threads; memory of the whole process, the largest in each stage.</p>\n",
+                      number(summary_, "threads"));
   }
 
   void settings() {

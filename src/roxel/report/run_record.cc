@@ -103,12 +103,17 @@ ordered_json light_json(const LightRecord& light) {
           {"spread", light.spread}};
 }
 
+ordered_json known_bytes(std::int64_t bytes) {
+  return bytes > 0 ? ordered_json(bytes) : ordered_json(nullptr);
+}
+
 ordered_json level_json(const LevelRecord& level) {
   return {{"voxel_size", level.voxel_size},
           {"voxels_in_box", level.voxels_in_box},
           {"voxels_around", level.voxels_around},
           {"converged", level.converged},
-          {"seconds", level.seconds}};
+          {"seconds", level.seconds},
+          {"peak_memory_bytes", known_bytes(level.peak_memory_bytes)}};
 }
 
 ordered_json view_json(const ViewFigures& view, const std::array<float, 3>& light) {
@@ -136,6 +141,12 @@ ordered_json list(const std::vector<T>& items, ToJson to) {
 
 }  // namespace
 
+ordered_json to_json(const StageRecord& stage) {
+  return {{"name", stage.name},
+          {"seconds", stage.seconds},
+          {"peak_memory_bytes", known_bytes(stage.peak_memory_bytes)}};
+}
+
 ordered_json to_json(const RunRecord& record) {
   const Summary& summary = record.summary;
   ordered_json json{{"format", kSummaryFormat},
@@ -154,12 +165,7 @@ ordered_json to_json(const RunRecord& record) {
                     {"levels", list(summary.levels, level_json)},
                     {"passes", list(summary.passes, pass_json)},
                     {"light", list(summary.light, light_json)},
-                    {"stages", list(summary.stages,
-                                    [](const StageRecord& s) {
-                                      return ordered_json{{"name", s.name},
-                                                          {"seconds", s.seconds},
-                                                          {"peak_memory_bytes", s.peak_memory_bytes}};
-                                    })},
+                    {"stages", list(summary.stages, [](const StageRecord& stage) { return to_json(stage); })},
                     {"mesh", record.mesh},
                     {"seconds", summary.seconds},
                     {"threads", record.threads},

@@ -49,6 +49,9 @@ struct RunRecord {
 
 nlohmann::ordered_json to_json(const RunRecord& record);
 
+/// One of its "stages".
+nlohmann::ordered_json to_json(const StageRecord& stage);
+
 /// Adds what `view` is: camera, lens and hash of the image file. Order matters.
 void add_to_hash(const View& view, const std::string& file_hash, std::string& combined);
 

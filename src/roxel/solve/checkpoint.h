@@ -20,7 +20,8 @@ struct PassState {
   bool light_rests = false;  ///< the light is no longer fitted in this level
   bool level_done = false;   ///< all of its passes; what is done between levels is not
   LightSource light_from = LightSource::kNone;
-  double level_seconds = 0;  ///< spent on this level
+  double level_seconds = 0;           ///< spent on this level
+  std::int64_t level_peak_bytes = 0;  ///< held for it; 0: not known
 };
 
 /// A checkpoint that has been read: it owns what it holds.

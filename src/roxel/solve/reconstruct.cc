@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "roxel/base/error.h"
+#include "roxel/base/peak_memory.h"
 #include "roxel/infer/touch.h"
 #include "roxel/solve/gains.h"
 #include "roxel/solve/surface_paint.h"
@@ -318,7 +319,9 @@ class Levels {
 
   void run_level(PassState& state) {
     const auto level_start = Clock::now();
+    const PeakMemory memory;
     const double earlier = state.level_seconds;
+    const std::int64_t earlier_peak = state.level_peak_bytes;
     const double voxel_size = std::ldexp(made_.scene.voxel_size, options_.levels - state.level);
     LevelSamples samples(dataset_, load_, options_, context_, voxel_size);
     samples.make(made_.scene);
@@ -327,8 +330,10 @@ class Levels {
     if (state.passes > 0) acceleration.recall(std::move(hooks_.resume->accelerated));
     const auto offer_checkpoint = [&] {
       state.level_seconds = earlier + seconds_since(level_start);
+      state.level_peak_bytes = std::max(earlier_peak, memory.bytes());
       state.light_from = made_.scene.light.from;
       made_.summary.seconds = seconds_so_far();
+      made_.summary.peak_memory_bytes = std::max(made_.summary.peak_memory_bytes, peak_memory_bytes());
       if (hooks_.checkpoint)
         hooks_.checkpoint(
             {state, made_.summary, made_.scene.light.of_views, acceleration.memory(), made_.volume});
@@ -342,6 +347,7 @@ class Levels {
         LevelPasses(options_, first_ever, context_, progress_, hooks_)
             .run(samples, acceleration, offer_checkpoint, state, made_.scene, made_.volume, made_.summary);
     record.seconds = earlier + seconds_since(level_start);
+    record.peak_memory_bytes = std::max(earlier_peak, memory.bytes());
     made_.summary.levels.push_back(record);
     state.level_done = true;
     acceleration.recall({});  // of no use to the next level
@@ -449,17 +455,18 @@ Reconstruction reconstruct(const Dataset& dataset, const PhotographLoader& load,
                            const ReconstructOptions& options, RunContext& context,
                            const ReconstructHooks& hooks, double progress_share) {
   const auto start = Clock::now();
+  PeakMemory memory;
   Reconstruction result;
   Summary& summary = result.summary;
   result.scene = survey(dataset, load, options, context, hooks.daylight);
   summary.notes = dataset.notes;
   summary.notes.insert(summary.notes.end(), result.scene.notes.begin(), result.scene.notes.end());
   if (hooks.after_survey) hooks.after_survey(result.scene);
-  summary.stages.push_back({"survey", seconds_since(start), peak_memory_bytes()});
+  summary.stages.push_back({"survey", seconds_since(start), memory.bytes()});
 
   Levels(dataset, load, options, context, hooks, progress_share, start, result).run();
   summary.termination = summary.levels.back().converged ? "converged" : "pass limit";
-  summary.peak_memory_bytes = peak_memory_bytes();
+  summary.peak_memory_bytes = std::max(summary.peak_memory_bytes, peak_memory_bytes());
   return result;
 }
 

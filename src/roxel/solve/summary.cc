@@ -1,7 +1,5 @@
 #include "roxel/solve/summary.h"
 
-#include <sys/resource.h>
-
 #include <cstdio>
 
 namespace roxel {
@@ -16,12 +14,6 @@ std::string Summary::brief() const {
       levels.back().voxel_size, passes.back().mean_log_likelihood, seconds,
       static_cast<double>(peak_memory_bytes) / (1 << 30));
   return text;
-}
-
-std::int64_t peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
 }
 
 }  // namespace roxel

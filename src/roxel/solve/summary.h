@@ -37,14 +37,15 @@ struct LevelRecord {
   double voxel_size = 0;
   std::int64_t voxels_in_box = 0;
   std::int64_t voxels_around = 0;
-  bool converged = false;  ///< the mean opacity change fell below the tolerance
-  double seconds = 0;      ///< images, topology and passes
+  bool converged = false;              ///< the mean opacity change fell below the tolerance
+  double seconds = 0;                  ///< images, topology and passes
+  std::int64_t peak_memory_bytes = 0;  ///< resident while it ran; 0: not known
 };
 
 struct StageRecord {
   std::string name;
   double seconds = 0;
-  std::int64_t peak_memory_bytes = 0;  ///< of the process up to its end; 0: not known
+  std::int64_t peak_memory_bytes = 0;  ///< resident while it ran; 0: not known
 };
 
 struct Summary {
@@ -60,8 +61,5 @@ struct Summary {
   /// One line for a person.
   std::string brief() const;
 };
-
-/// Peak resident memory of this process, in bytes.
-std::int64_t peak_memory_bytes();
 
 }  // namespace roxel

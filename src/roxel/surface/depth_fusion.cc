@@ -19,6 +19,10 @@ using MaskTree = openvdb::MaskTree;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
 constexpr std::int64_t kPixelsAtOnce = 16'000'000;  ///< of views that are in memory together
+constexpr std::int64_t kViewsShare = 4;  ///< one part in so many of the memory is theirs, if they need that
+constexpr std::int64_t kBytesPerPixel = 4 * sizeof(float);  ///< of a view that is ready
+/// Of one that is being read: the layers of its file, and what is made of them.
+constexpr std::int64_t kBytesPerPixelRead = 16 * sizeof(float);
 constexpr float kLeastCosine = 0.2f;  ///< of the angle between ray and normal: steeper depth says no less
 constexpr float kUnknownCosine = 0.7f;
 constexpr float kSupport = 2.5f;  ///< steps from its surface within which a view supports one
@@ -231,13 +235,16 @@ class Fusion {
   }
 
  private:
-  /// Calls visit(prepared views of a batch) for one batch after the other, in the order of views.
+  /// Calls visit(prepared views of a batch) for one batch after the other, in the order of views. No result
+  /// depends on how many they are.
   template <class Visit>
   void for_each_batch(const Visit& visit) {
+    const std::int64_t most_pixels =
+        std::min(kPixelsAtOnce, options_.most_bytes / (kViewsShare * kBytesPerPixel));
     for (int begin = 0; begin < view_count_;) {
       std::vector<PreparedView> batch;
       std::int64_t pixels = 0;
-      while (begin < view_count_ && (batch.empty() || pixels < kPixelsAtOnce)) {
+      while (begin < view_count_ && (batch.empty() || pixels < most_pixels)) {
         const int count = std::min(view_count_ - begin, context_.thread_count());
         const std::size_t first = batch.size();
         batch.resize(first + count);
@@ -245,10 +252,14 @@ class Fusion {
           context_.throw_if_cancelled();
           batch[first + i] = prepare(load_(begin + static_cast<int>(i)), options_);
         });
-        for (int i = 0; i < count; ++i)
-          pixels += static_cast<std::int64_t>(batch[first + i].depth.data().size());
+        for (int i = 0; i < count; ++i) {
+          const auto size = static_cast<std::int64_t>(batch[first + i].depth.data().size());
+          pixels += size;
+          largest_view_ = std::max(largest_view_, size);
+        }
         begin += count;
       }
+      largest_batch_ = std::max(largest_batch_, pixels);
       visit(batch);
     }
   }
@@ -294,7 +305,11 @@ class Fusion {
   void check_size(const MaskTree& places) const {
     const std::int64_t leaves = static_cast<std::int64_t>(places.leafCount());
     const std::int64_t later = lattice_bytes(leaves, static_cast<std::int64_t>(places.activeVoxelCount()));
-    check_lattice_bytes(std::max(leaves * kBytesPerLeaf, later), options_.most_bytes, options_.voxel_size);
+    const std::int64_t views =
+        largest_batch_ * kBytesPerPixel +
+        std::min(context_.thread_count(), view_count_) * largest_view_ * kBytesPerPixelRead;
+    check_lattice_bytes(std::max(leaves * kBytesPerLeaf + views, later), options_.most_bytes,
+                        options_.voxel_size);
   }
 
   void gather_votes() {
@@ -353,6 +368,7 @@ class Fusion {
   RunContext& context_;
   std::unique_ptr<DistanceField::Voxels> voxels_;
   std::optional<Spread> spread_;
+  std::int64_t largest_batch_ = 0, largest_view_ = 0;  ///< pixels
 };
 
 }  // namespace

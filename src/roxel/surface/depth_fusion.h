@@ -41,7 +41,7 @@ struct FusionOptions {
   float free_opacity = 0.1f;  ///< rays without depth and of less opacity than that see nothing in the box
   double smooth = 0.3;        ///< pull of neighbours, see smooth_distance; 0 = none
   double hole_size = 12;  ///< how far apart seen edges may be that distances are carried on between, voxels
-  /// InvalidInput where the lattice, and what is made from it, would take more.
+  /// InvalidInput where the lattice, the views that vote on it, and what is made from it would take more.
   std::int64_t most_bytes = std::int64_t{8} << 30;
 };
 
@@ -77,8 +77,8 @@ class DistanceField {
 };
 
 /// Views are loaded a few at a time. The same bit for bit for any number of threads. Throws NoSurface
-/// where no view has depth in the box, InvalidInput where the lattice would take more than
-/// options.most_bytes; Cancelled.
+/// where no view has depth in the box, InvalidInput where more than options.most_bytes would
+/// be needed; Cancelled.
 DistanceField fuse_depth(int view_count, const FusionViewLoader& load, const FusionOptions& options,
                          RunContext& context);
 

@@ -26,10 +26,11 @@ DistanceField fused(const std::vector<FusionView>& views, const FusionOptions& o
 }
 
 /// A camera at the origin that sees a wall at that distance everywhere.
-FusionView wall(float depth, float variance) {
+FusionView wall(float depth, float variance, int size = 32) {
   PinholeCamera camera;
-  camera.intrinsics = {32, 32, 40, 40, 16, 16, 0};
-  return {camera, Image(32, 32, 1, depth), Image(32, 32, 1, variance), Image(32, 32, 1, 1.0f), {}};
+  camera.intrinsics = {size, size, 1.25 * size, 1.25 * size, 0.5 * size, 0.5 * size, 0};
+  return {
+      camera, Image(size, size, 1, depth), Image(size, size, 1, variance), Image(size, size, 1, 1.0f), {}};
 }
 
 FusionOptions wall_options() {
@@ -137,6 +138,31 @@ TEST(DepthFusion, WhatHolesNeedCountsAsMemoryToo) {
       }
   };
   EXPECT_GT(least(60), 2 * least(0));
+}
+
+TEST(DepthFusion, ViewsCountAsMemoryTooAndHowManyAreHeldChangesNothing) {
+  // The same wall, with four times the pixels.
+  const auto least = [](int size) {
+    FusionOptions options = wall_options();
+    options.hole_size = 0;
+    for (options.most_bytes = 1 << 16;; options.most_bytes += options.most_bytes / 16) try {
+        fused({wall(2.0f, 0.01f, size), wall(2.0f, 0.01f, size)}, options);
+        return options.most_bytes;
+      } catch (const InvalidInput&) {
+      }
+  };
+  EXPECT_GT(least(512), least(256) + 2 * (512 * 512 - 256 * 256) * 16);
+
+  FusionOptions ample = fixture::ball_fusion(), tight = ample;
+  const auto points = [](const FusionOptions& options) {
+    return extract_surface(fused(ball_views(), options, 1), {}).surface.mesh.points;
+  };
+  const auto expected = points(ample);
+  for (tight.most_bytes = 1 << 20;; tight.most_bytes += tight.most_bytes / 16) try {
+      EXPECT_EQ(points(tight), expected);
+      break;
+    } catch (const InvalidInput&) {
+    }
 }
 
 TEST(DepthFusion, CanBeCancelled) {

@@ -104,10 +104,10 @@ std::int64_t lattice_bytes(std::int64_t leaves, std::int64_t corners) {
 
 void check_lattice_bytes(std::int64_t bytes, std::int64_t most, double voxel_size) {
   if (bytes <= most) return;
-  throw InvalidInput(
-      formatted("the surface's lattice of voxels of %g would take %lld MiB: found %lld MiB for "
-                "it, expected more memory, larger voxels, or less to fuse",
-                voxel_size, static_cast<long long>(bytes >> 20), static_cast<long long>(most >> 20)));
+  throw InvalidInput(formatted(
+      "the surface's lattice of voxels of %g and what it is made of would take %lld MiB: found %lld MiB for "
+      "it, expected more memory, larger voxels, or less to fuse",
+      voxel_size, static_cast<long long>(bytes >> 20), static_cast<long long>(most >> 20)));
 }
 
 void smooth_distance(DistanceField::Voxels& voxels, double strength, int threads) {

@@ -221,20 +221,23 @@ class Texturing {
     const auto uv_of = [&](const Vector2d& at) -> Eigen::Vector2f {
       return {static_cast<float>(at.x() / size_.width), static_cast<float>(at.y() / size_.height)};
     };
-    std::vector<std::uint32_t> number(points_.point.size());
-    std::vector<std::uint32_t> of_chart(points_.point.size(), 0xffffffffu);
+    struct Numbered {
+      std::uint32_t chart = 0xffffffffu, uv = 0;
+    };
+    std::vector<Numbered> last(points_.point.size());
     for (std::uint32_t i = 0; i < charts_.size(); ++i)
       for (const std::uint32_t f : charts_[i].faces) {
         const auto places = charts_[i].view == kNoView ? places_of_unseen(i) : places_of(i, f);
         for (int k = 0; k < 3; ++k) {
           const std::int32_t n = points_.of_face[f][k];
-          if (n < 0 || of_chart[n] != i) {
-            if (n >= 0) of_chart[n] = i, number[n] = static_cast<std::uint32_t>(out_.uvs.size());
-            out_.uv_corners[f][k] = static_cast<std::uint32_t>(out_.uvs.size());
-            out_.uvs.push_back(uv_of(places[k]));
-          } else {
-            out_.uv_corners[f][k] = number[n];
+          if (n >= 0 && last[n].chart == i) {
+            out_.uv_corners[f][k] = last[n].uv;
+            continue;
           }
+          const auto uv = static_cast<std::uint32_t>(out_.uvs.size());
+          if (n >= 0) last[n] = {i, uv};
+          out_.uv_corners[f][k] = uv;
+          out_.uvs.push_back(uv_of(places[k]));
         }
       }
   }
