@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """What `roxel` reaches on ray-traced worlds with known depth and surface: figures below which it must not fall. Needs the data sets
-plane and head, in the folder that the environment variable ROXEL_TEST_DATA names or in a folder shared/data above this one.
+plane, head and courtyard, in the folder that the environment variable ROXEL_TEST_DATA names or in a folder shared/data above this one.
 
     accuracy_test.py ROXEL [unittest arguments, e.g. Plane]
 """
@@ -26,6 +26,7 @@ class AccuracyCase(cli_test.Case):
     name = None  # of the data set
     bounds = None
     diagonal = None  # of the bounds, world units
+    options = ["--voxel-size", "0.02"]
 
     @classmethod
     def setUpClass(cls):
@@ -34,8 +35,7 @@ class AccuracyCase(cli_test.Case):
             raise unittest.SkipTest(f"test data \"{cls.name}\" is not here; set ROXEL_TEST_DATA to its folder")
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-accuracy-"))
         out = cls.folder / "run"
-        for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", "--voxel-size", "0.02", "--no-render", "--no-report",
-                         "--quiet"],
+        for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", *cls.options, "--no-render", "--no-report", "--quiet"],
                         ["eval", out, "--truth", data, "-o", cls.folder / "metrics", "--quiet"]):
             done = cli_test.run(*command, timeout=1000)
             assert done.returncode == 0, done.stderr
@@ -49,13 +49,16 @@ class AccuracyCase(cli_test.Case):
         within = self.metrics["surfaces"][-1]["within"]
         return min(within, key=lambda entry: abs(entry["distance"] - share_of_diagonal * self.diagonal))["f_score"]
 
-    def check(self, within, f_scores, log_loss):
-        self.assertEqual(self.metrics["surfaces"][-1]["name"], "mesh")
+    def check_depth(self, within):
         volume, bp, refined = (self.within(method) for method in ("volume", "bp", "refined"))
         for v, b, r, least in zip(volume, bp, refined, within):
             self.assertGreaterEqual(b, v - 0.5)
             self.assertGreater(r, max(v, b))
             self.assertGreater(r, least)
+
+    def check(self, within, f_scores, log_loss):
+        self.assertEqual(self.metrics["surfaces"][-1]["name"], "mesh")
+        self.check_depth(within)
         for share, least in zip((0.005, 0.01), f_scores):
             self.assertGreaterEqual(self.f_score(share), least)
         refined = self.metrics["depth"]["methods"]["refined"]
@@ -79,6 +82,16 @@ class Head(AccuracyCase):
 
     def test_depth_uncertainty_and_surface(self):
         self.check([73, 87.5, 94], [0.93, 0.98], 1.15)
+
+
+class Courtyard(AccuracyCase):
+    """Four of its eight nodes, at coarse voxels: all of it, at half a metre, takes minutes."""
+
+    name, bounds, diagonal = "courtyard", "-36,-32,-0.5,36,33,28", 101.04
+    options = ["--nodes", "0:4", "--voxel-size", "1", "--matching", "local", "--refine-rounds", "2", "--no-mesh"]
+
+    def test_depth(self):
+        self.check_depth([0, 0, 0])
 
 
 if __name__ == "__main__":

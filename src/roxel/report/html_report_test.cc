@@ -23,7 +23,10 @@ ReportContent some_content() {
                      {"warnings", {"the box <cuts> what is seen"}},
                      {"options", {{"levels", 3}, {"init", nullptr}, {"noise", 0.5}}},
                      {"levels", {{{"voxel_size", 0.25}, {"seconds", 3.0}, {"voxels_in_box", 1234567}}}},
-                     {"stages", {{{"name", "survey"}, {"seconds", 1.0}}}},
+                     {"stages",
+                      {{{"name", "survey"}, {"seconds", 1.0}, {"peak_memory_bytes", 50 * 1024 * 1024}},
+                       {{"name", "mesh"}, {"seconds", 0.0}, {"peak_memory_bytes", nullptr}}}},
+                     {"peak_memory_bytes", 70 * 1024 * 1024},
                      {"seconds", 4.0},
                      {"passes",
                       {{{"level", 1},
@@ -62,7 +65,9 @@ TEST(HtmlReport, SaysWhatTheSummarySays) {
   EXPECT_THAT(page, HasSubstr("1 of 30 views"));
   EXPECT_THAT(page, HasSubstr("init = auto"));
   EXPECT_THAT(page, HasSubstr("noise = 0.5"));
-  EXPECT_THAT(page, HasSubstr("<td>survey</td><td>1 s</td><td>25.0 %</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>survey</td><td>1 s</td><td>25.0 %</td><td>50 MiB</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>mesh</td><td>0 s</td><td>0.0 %</td><td></td>"));
+  EXPECT_THAT(page, HasSubstr("<td>70 MiB</td>"));
   EXPECT_THAT(page, HasSubstr("Mean change of opacity"));
   EXPECT_THAT(page, HasSubstr("roxel 1.2.3"));
   EXPECT_THAT(page, Not(HasSubstr("Against the truth")));

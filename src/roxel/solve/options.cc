@@ -58,8 +58,9 @@ void add_volume(OptionTable<Options>& table) {
           "auto: where the background is not known");
   table.add("memory", &Options::memory)
       .help(
-          "Keep to this much memory: samples that do not fit are made anew in each pass; results are the "
-          "same")
+          "Keep to this much memory: samples that do not fit are made anew in each pass, refinement holds "
+          "fewer "
+          "views, and a surface whose lattice does not fit is an error; results are the same")
       .unit("GiB")
       .above(0)
       .unset("what the machine has at hand");
