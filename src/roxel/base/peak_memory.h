@@ -1,6 +1,7 @@
 #pragma once
 /// The most memory that a stretch of a program has held. The system keeps one high-water mark a process; each
-/// stretch that begins lets it start anew, after it was added to those that are running.
+/// stretch that begins lets it start anew, after it was added to those that are running, and gives back to
+/// the system what was freed before it.
 
 #include <cstdint>
 
