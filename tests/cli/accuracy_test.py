@@ -49,16 +49,13 @@ class AccuracyCase(cli_test.Case):
         within = self.metrics["surfaces"][-1]["within"]
         return min(within, key=lambda entry: abs(entry["distance"] - share_of_diagonal * self.diagonal))["f_score"]
 
-    def check_depth(self, within):
+    def check(self, within, f_scores, log_loss):
+        self.assertEqual(self.metrics["surfaces"][-1]["name"], "mesh")
         volume, bp, refined = (self.within(method) for method in ("volume", "bp", "refined"))
         for v, b, r, least in zip(volume, bp, refined, within):
             self.assertGreaterEqual(b, v - 0.5)
             self.assertGreater(r, max(v, b))
             self.assertGreater(r, least)
-
-    def check(self, within, f_scores, log_loss):
-        self.assertEqual(self.metrics["surfaces"][-1]["name"], "mesh")
-        self.check_depth(within)
         for share, least in zip((0.005, 0.01), f_scores):
             self.assertGreaterEqual(self.f_score(share), least)
         refined = self.metrics["depth"]["methods"]["refined"]
@@ -85,13 +82,15 @@ class Head(AccuracyCase):
 
 
 class Courtyard(AccuracyCase):
-    """Four of its eight nodes, at coarse voxels: all of it, at half a metre, takes minutes."""
+    """Three of its eight nodes, at coarse voxels and without refinement: all of it, at half a metre, takes minutes."""
 
     name, bounds, diagonal = "courtyard", "-36,-32,-0.5,36,33,28", 101.04
-    options = ["--nodes", "0:4", "--voxel-size", "1", "--matching", "local", "--refine-rounds", "2", "--no-mesh"]
+    options = ["--nodes", "0:3", "--voxel-size", "1", "--matching", "local", "--no-refine", "--no-mesh"]
 
-    def test_depth(self):
-        self.check_depth([0, 0, 0])
+    def test_belief_propagation_costs_little_where_the_volume_errs(self):
+        for volume, bp in zip(self.within("volume"), self.within("bp")):
+            self.assertGreater(volume, 5)
+            self.assertGreaterEqual(bp, volume - 0.5)
 
 
 if __name__ == "__main__":
