@@ -105,21 +105,32 @@ KeptColors::KeptColors(std::size_t node_count, std::size_t limit_bytes)
     : limit_bytes_(static_cast<std::int64_t>(limit_bytes)), left_bytes_(limit_bytes_), nodes_(node_count) {}
 
 void KeptColors::clear() {
-  left_bytes_ = limit_bytes_;
-  for (Node& node : nodes_) node = {};  // or nodes that get no room next time would hold on to theirs
+  // What nodes hold is theirs until they are asked again: memory that is given back is taken anew page by page.
+  std::int64_t held = 0;
+  for (Node& node : nodes_) {
+    node.kept = false;
+    node.colors.clear();
+    held += static_cast<std::int64_t>(node.held_bytes);
+  }
+  left_bytes_ = limit_bytes_ - held;
 }
 
 OwnColors* KeptColors::room_for(std::size_t node) {
-  if (left_bytes_ <= 0) return nullptr;
+  if (limit_bytes_ <= 0 || (left_bytes_ <= 0 && nodes_[node].held_bytes == 0)) return nullptr;
   return &nodes_[node].colors;
 }
 
 void KeptColors::keep(std::size_t node) {
-  const std::int64_t bytes = static_cast<std::int64_t>(nodes_[node].colors.bytes());
-  nodes_[node].kept = left_bytes_.fetch_sub(bytes) >= bytes;
-  if (nodes_[node].kept) return;
-  left_bytes_ += bytes;
-  nodes_[node].colors = {};
+  Node& n = nodes_[node];
+  const auto held = static_cast<std::int64_t>(n.held_bytes);
+  const auto more = std::max<std::int64_t>(static_cast<std::int64_t>(n.colors.bytes()) - held, 0);
+  n.kept = left_bytes_.fetch_sub(more) >= more;
+  if (n.kept) {
+    n.held_bytes += static_cast<std::size_t>(more);
+    return;
+  }
+  left_bytes_ += more + held;
+  n = {};
 }
 
 CollectedColors& PassMemory::colors(std::uint32_t slot_count, std::size_t node_count,

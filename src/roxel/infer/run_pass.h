@@ -33,7 +33,7 @@ using PassProgress = std::function<void(double fraction)>;
 class KeptColors {
  public:
   KeptColors(std::size_t node_count, std::size_t limit_bytes);
-  /// Forgets all colours.
+  /// Forgets all colours, but not the memory that they lay in.
   void clear();
   /// Where a node's colours may be put, empty, or null without room. Then say keep(node). Safe from several
   /// threads for different nodes, at most once a node.
@@ -47,6 +47,7 @@ class KeptColors {
  private:
   struct Node {
     bool kept = false;
+    std::size_t held_bytes = 0;  ///< that count against the limit: the most that was kept here
     OwnColors colors;
   };
   std::int64_t limit_bytes_;
