@@ -35,10 +35,6 @@ void OpacityPackets::tile(const ListedView& listed, const Tile& tile) {
   distribute();
 }
 
-RegionStats OpacityPackets::stats_of(const SampleView& view, const Sample& sample) {
-  return view.pyramid->at(sample.region.level, sample.region.x, sample.region.y);
-}
-
 /// Adds the region's sample, unless it has no valid pixels.
 void OpacityPackets::add(const SampleView& view, const Region& region, int parent) {
   const float valid = view.pyramid->valid(region.level, region.x, region.y);

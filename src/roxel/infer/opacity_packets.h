@@ -56,7 +56,9 @@ class OpacityPackets {
   void divided(std::size_t sample, std::size_t first_child, std::size_t end_child);
   void level_done(std::size_t end_sample) { levels_.push_back({end_sample, packets_.size()}); }
 
-  static RegionStats stats_of(const SampleView& view, const Sample& sample);
+  static RegionStats stats_of(const SampleView& view, const Sample& sample) {
+    return view.pyramid->at(sample.region.level, sample.region.x, sample.region.y);
+  }
   void look_behind(const SampleView& view);
   void distribute();
   void give_out(const Packet& packet);

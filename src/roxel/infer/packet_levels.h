@@ -56,7 +56,7 @@ void march_tile(March& march, const ListedView& listed, const Tile& tile) {
         march.begin(view.camera.pose.centre, range, bricks);
       }
       const Eigen::Vector2d at = region_centre(view, region);
-      march.add_ray(packet.count, view.camera.ray(at.x(), at.y()).direction);
+      march.add_ray(packet.count, listed.direction_from_pixel * Eigen::Vector3d(at.x(), at.y(), 1));
       packet.sample[packet.count++] = static_cast<int>(i);
       if (packet.count == PacketWalk::rays()) flush();
     }

@@ -79,16 +79,21 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
   used.set_workers(context.thread_count());
   colors.totals.clear_color();
   colors.kept.clear();
+  std::vector<double> march_seconds(context.thread_count(), 0.0);
   const PassCounts counts = sum(for_each_node(nodes, context, progress, 0, 0.3, [&](int node, int worker) {
     NodeScratch& scratch = used.scratch(worker, stack, stack.volume().tau);
+    const SampleNode views = resident(nodes[node]);
+    const double march_start = thread_seconds();
     const PassCounts node_counts =
-        march_color(stack, resident(nodes[node]), options.opacity, options.everywhere, context, scratch);
+        march_color(stack, views, options.opacity, options.everywhere, context, scratch);
+    march_seconds[worker] += thread_seconds() - march_start;
     OwnColors* own = options.predictive ? colors.kept.room_for(node) : nullptr;
     colors.totals.add_color(stack, scratch, own);
     if (own) colors.kept.keep(node);
     return node_counts;
   }));
   colors_of(colors.totals.color, context.thread_count(), colors.of_totals);
+  colors.march_cpu_seconds = std::accumulate(march_seconds.begin(), march_seconds.end(), 0.0);
   return counts;
 }
 
@@ -163,6 +168,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   auto start = Clock::now();
   report.color = collect_color(stack, nodes, options, context, progress, colors, &used);
   report.color_seconds = seconds_since(start);
+  report.color_march_cpu_seconds = colors.march_cpu_seconds;
 
   start = Clock::now();
   totals.clear_opacity();
@@ -178,7 +184,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
     return counts;
   }));
   report.opacity_seconds = seconds_since(start);
-  for (const double seconds : march_seconds) report.opacity_march_cpu_seconds += seconds;
+  report.opacity_march_cpu_seconds = std::accumulate(march_seconds.begin(), march_seconds.end(), 0.0);
 
   const std::vector<float> field = prior_opacity_field(volume, options.prior, context.thread_count());
   report.prior_log_likelihood = log_prior(volume, field, options.prior.strength);

@@ -21,6 +21,7 @@ struct PassReport {
   PassCounts opacity;
   double color_seconds = 0;    ///< wall time of the colour marches that make the totals
   double opacity_seconds = 0;  ///< wall time of the opacity marches, with the node's own colours again
+  double color_march_cpu_seconds = 0;    ///< summed over workers, of the march that makes the totals alone
   double opacity_march_cpu_seconds = 0;  ///< summed over workers, of march_opacity alone
   double prior_log_likelihood = 0;       ///< log prior of tau given the field used, up to a constant
 };
@@ -63,6 +64,7 @@ struct CollectedColors {
   Totals totals;
   KeptColors kept;
   std::vector<VoxelColor> of_totals;
+  double march_cpu_seconds = 0;  ///< of the marches that made them, summed over workers
 };
 
 /// Makes the scratch hold what the nodes other than number `node_idx` say (all nodes without

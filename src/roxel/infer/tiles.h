@@ -1,6 +1,8 @@
 #pragma once
 /// The order in which marches take a node's root samples.
 
+#include <Eigen/LU>
+
 #include "roxel/base/run_context.h"
 #include "roxel/infer/sample_view.h"
 #include "roxel/march/brick_lists.h"
@@ -20,9 +22,12 @@ struct ViewInSight {
 struct ListedView {
   const SampleView& view;
   BrickLists lists;
+  Eigen::Matrix3d direction_from_pixel;  ///< of (u, v, 1): PinholeCamera::ray
 
   ListedView(const LatticeStack& stack, const SampleView& of)
-      : view(of), lists(stack, of.camera, of.plan) {}
+      : view(of),
+        lists(stack, of.camera, of.plan),
+        direction_from_pixel(of.camera.pose.rotation.transpose() * of.camera.intrinsics.matrix().inverse()) {}
 };
 
 /// Root samples [x0, x1) x [y0, y1) of a view: so few that what a march keeps of them stays in the cache

@@ -1,5 +1,7 @@
 #include "roxel/march/packet_kernels.h"
 
+#include <cstddef>
+
 #include "roxel/base/vector_targets.h"
 #include "roxel/volume/volume.h"
 
@@ -26,6 +28,46 @@ constexpr int kRays = static_cast<int>(hn::MaxLanes(FloatTag()));
 constexpr int kHalf = static_cast<int>(hn::MaxLanes(DoubleTag()));  ///< rays in a vector of doubles
 
 int lanes() { return kRays; }
+
+void prepare(PacketRays& rays) {
+  const DoubleTag d;
+  const HalfIntTag di;
+  const HalfFloatTag df;
+  const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
+  const auto per_unit = hn::Set(d, 1 / kPacketUnit), unit_size = hn::Set(d, kPacketUnit);
+  const auto least = hn::Set(d, 1.0 / (1 << 30)), far = hn::Set(d, kPacketFar);
+  for (int i = 0; i < kRays; i += kHalf) {
+    hn::Vec<DoubleTag> direction[3];
+    auto squared = zero;
+    for (int a = 0; a < 3; ++a) {
+      direction[a] = hn::Load(d, rays.direction[a] + i);
+      squared = hn::MulAdd(direction[a], direction[a], squared);
+    }
+    const auto norm = hn::Sqrt(squared);
+    const auto inverse_norm = hn::Div(one, norm);
+    hn::Store(hn::Mul(norm, per_unit), d, rays.arc_per_depth + i);
+    for (int a = 0; a < 3; ++a) {
+      const auto share = hn::Mul(direction[a], inverse_norm);
+      const auto back = hn::Lt(share, zero);
+      const auto size = hn::Max(hn::Abs(share), least);
+      const auto unit = hn::IfThenElse(back, hn::Neg(size), size);
+      const auto distance = hn::Mul(hn::Div(one, size), per_unit);
+      const auto sign = hn::IfThenElse(back, hn::Set(d, -1.0), one);
+      hn::Store(hn::Mul(hn::Div(one, unit), inverse_norm), d, rays.inverse[a] + i);
+      hn::Store(distance, d, rays.distance[a] + i);
+      hn::Store(hn::Mul(size, unit_size), d, rays.per_distance[a] + i);
+      hn::Store(hn::DemoteTo(df, unit), df, rays.unit[a] + i);
+      hn::Store(hn::DemoteTo(df, sign), df, rays.sign[a] + i);
+      hn::Store(hn::DemoteTo(df, hn::IfThenElseZero(hn::Not(back), hn::Set(d, kBrickSide))), df,
+                rays.last_place[a] + i);
+      const double cell_step = 1 << 3 * a;
+      hn::Store(hn::DemoteTo(di, hn::Mul(sign, hn::Set(d, cell_step))), di, rays.step[a] + i);
+      hn::Store(hn::DemoteTo(di, hn::IfThenElseZero(hn::Not(back), hn::Set(d, (kBrickSide - 1) * cell_step))),
+                di, rays.last_cell[a] + i);
+      hn::Store(hn::DemoteTo(di, hn::Min(distance, far)), di, rays.delta[a] + i);
+    }
+  }
+}
 
 std::uint32_t meet(const PacketRays& rays, const double lo[3], const double hi[3], double begin, double end,
                    BrickHits& hits) {
@@ -130,6 +172,49 @@ HWY_INLINE int walk_cells(const PacketRays& rays, BrickCrossings& crossings) {
   return rows;
 }
 
+/// Where the voxels of each ray's brick begin: Brick::local, in bytes from the first of them.
+struct alignas(64) LocalTables {
+  const std::int32_t* base;
+  std::int32_t offset[kMaxPacketRays];
+};
+
+/// False where the bricks are too far apart in memory.
+HWY_INLINE bool find_tables(const BrickCrossings& crossings, LocalTables& tables) {
+  constexpr std::int64_t kFar = std::int64_t{1} << 30;
+  const char* base = nullptr;
+  for (int ray = 0; ray < kRays; ++ray) {
+    tables.offset[ray] = 0;
+    if (crossings.count[ray] == 0) continue;
+    const char* const local = reinterpret_cast<const char*>(crossings.local[ray]);
+    if (!base) base = local;
+    const std::int64_t offset = local - base;
+    if (offset < -kFar || offset > kFar) return false;
+    tables.offset[ray] = static_cast<std::int32_t>(offset);
+  }
+  tables.base = reinterpret_cast<const std::int32_t*>(base);
+  return true;
+}
+
+/// Looks all cells up, ray by ray.
+HWY_INLINE void look_up_cells(BrickCrossings& crossings) {
+  for (int ray = 0; ray < kRays; ++ray)
+    for (int row = 0; row < crossings.count[ray]; ++row)
+      crossings.found[row][ray] = crossings.local[ray][crossings.cell[row][ray]];
+}
+
+/// The same, row by row.
+HWY_INLINE void look_up_rows(const LocalTables& tables, int rows, BrickCrossings& crossings) {
+  const IntTag di;
+  // An entry is two bytes: it is read with the two before it, which every table has.
+  static_assert(offsetof(Brick, local) >= 2);
+  const auto offset = hn::Sub(hn::Load(di, tables.offset), hn::Set(di, 2));
+  for (int row = 0; row < rows; ++row) {
+    const auto at = hn::Add(offset, hn::ShiftLeft<1>(hn::Load(di, crossings.cell[row])));
+    const auto pair = hn::BitCast(hn::RebindToUnsigned<IntTag>(), hn::GatherOffset(di, tables.base, at));
+    hn::Store(hn::BitCast(di, hn::ShiftRight<16>(pair)), di, crossings.found[row]);
+  }
+}
+
 /// Keeps what exists: slot and chord; `ray` gets ray + 16 cell.
 HWY_INLINE void keep_existing(const BrickCrossings& crossings, int rows, PacketSteps& steps) {
   const FloatTag df;
@@ -205,14 +290,11 @@ HWY_INLINE void pad(PacketSteps& steps) {
 
 void walk(const PacketRays& rays, BrickCrossings& crossings, PacketSteps& steps) {
   const int rows = walk_cells(rays, crossings);
-  for (int ray = 0; ray < kRays; ++ray) {
-    const std::uint16_t* const local = crossings.local[ray];
-    const std::int32_t* const cell = &crossings.cell[0][ray];
-    std::int32_t* const found = &crossings.found[0][ray];
-    const std::ptrdiff_t end = std::ptrdiff_t{kMaxPacketRays} * crossings.count[ray];
-#pragma GCC unroll 4
-    for (std::ptrdiff_t i = 0; i < end; i += kMaxPacketRays) found[i] = local[cell[i]];
-  }
+  LocalTables tables;
+  if (find_tables(crossings, tables))
+    look_up_rows(tables, rows, crossings);
+  else
+    look_up_cells(crossings);
   keep_existing(crossings, rows, steps);
   weigh(rays, crossings, steps);
   pad(steps);
@@ -226,10 +308,13 @@ HWY_AFTER_NAMESPACE();
 namespace roxel::internal {
 
 HWY_EXPORT(lanes);
+HWY_EXPORT(prepare);
 HWY_EXPORT(meet);
 HWY_EXPORT(walk);
 
 int packet_lanes() { return HWY_DYNAMIC_DISPATCH(lanes)(); }
+
+void prepare_rays(PacketRays& rays) { HWY_DYNAMIC_DISPATCH(prepare)(rays); }
 
 std::uint32_t meet_brick(const PacketRays& rays, const double lo[3], const double hi[3], double begin,
                          double end, BrickHits& hits) {

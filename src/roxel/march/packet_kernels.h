@@ -9,9 +9,11 @@
 
 namespace roxel::internal {
 
-/// Rays from one origin, an axis.
+/// Rays from one origin, an axis. All but the direction is made by prepare_rays.
 struct alignas(64) PacketRays {
-  double inverse[3][kMaxPacketRays];  ///< of the direction, in units of depth a world unit; finite
+  double direction[3][kMaxPacketRays];
+  double arc_per_depth[kMaxPacketRays];  ///< world units of arc a unit of depth, in kPacketUnit of a voxel of 1
+  double inverse[3][kMaxPacketRays];     ///< of the direction, in units of depth a world unit; finite
   float unit[3][kMaxPacketRays];      ///< direction of length 1
   // What is the same in every brick; positions along a ray are in kPacketUnit of its arc:
   double distance[3][kMaxPacketRays];      ///< between planes of cells
@@ -53,6 +55,9 @@ struct alignas(64) BrickCrossings {
 
 /// Floats in a vector: rays in a packet.
 int packet_lanes();
+/// Fills in what follows from the directions. A ray is never quite along planes: what it strays by is far
+/// below a voxel.
+void prepare_rays(PacketRays& rays);
 /// Which rays meet the brick between `lo` and `hi` (relative to the rays' origin) within the depths
 /// [begin, end): bit `lane`.
 std::uint32_t meet_brick(const PacketRays& rays, const double lo[3], const double hi[3], double begin,

@@ -1,6 +1,8 @@
 #include "roxel/march/packet_walk.h"
 
+#include <algorithm>
 #include <bit>
+#include <utility>
 
 #include "roxel/march/packet_kernels.h"
 
@@ -18,7 +20,6 @@ struct PacketWalk::State {
   static constexpr int kMostFound = 24;
 
   internal::PacketRays rays;
-  double arc_per_depth[kMaxPacketRays];  ///< world units of arc a unit of depth, in kPacketUnit of a voxel of 1
   Found found[kMostFound];
   /// Bricks that each ray has still to cross, in order: numbers of `found`.
   std::uint8_t waiting[kMaxPacketRays][kMostFound];
@@ -26,7 +27,9 @@ struct PacketWalk::State {
   internal::BrickCrossings crossings;
 };
 
-PacketWalk::PacketWalk(const LatticeStack& stack) : stack_(stack), state_(std::make_unique<State>()) {}
+PacketWalk::PacketWalk(const LatticeStack& stack) : stack_(stack), state_(std::make_unique<State>()) {
+  std::fill(state_->rays.direction[0], state_->rays.direction[0] + kMaxPacketRays, 1.0);  // of rays not added
+}
 PacketWalk::~PacketWalk() = default;
 
 int PacketWalk::rays() {
@@ -44,32 +47,10 @@ void PacketWalk::begin(const Eigen::Vector3d& origin, Stretch range, std::span<c
 }
 
 void PacketWalk::add(int ray, const Eigen::Vector3d& direction) {
-  constexpr double kUnit = internal::kPacketUnit;
-  // A ray is never quite along planes: what it strays by is far below a voxel.
-  constexpr double kLeastShare = 1.0 / (1 << 30);
-  internal::PacketRays& r = state_->rays;
-  const double norm = direction.norm();
-  const double inverse_norm = 1 / norm;
-  for (int a = 0; a < 3; ++a) {
-    const double share = direction[a] * inverse_norm;
-    const double least = share < 0 ? -kLeastShare : kLeastShare;
-    const double unit = std::abs(share) < kLeastShare ? least : share;
-    const double inverse = 1 / unit;
-    const bool ahead = unit > 0;
-    const double distance = std::abs(inverse) * (1 / kUnit);
-    r.inverse[a][ray] = inverse * inverse_norm;
-    r.unit[a][ray] = static_cast<float>(unit);
-    r.distance[a][ray] = distance;
-    r.per_distance[a][ray] = std::abs(unit) * kUnit;
-    r.delta[a][ray] = static_cast<std::int32_t>(std::min<double>(distance, internal::kPacketFar));
-    r.step[a][ray] = ahead ? 1 << 3 * a : -(1 << 3 * a);
-    r.last_cell[a][ray] = ahead ? (kBrickSide - 1) << 3 * a : 0;
-    r.last_place[a][ray] = ahead ? kBrickSide : 0;
-    r.sign[a][ray] = ahead ? 1 : -1;
-  }
-  state_->arc_per_depth[ray] = norm * (1 / kUnit);
+  for (int a = 0; a < 3; ++a) state_->rays.direction[a][ray] = direction[a];
   state_->first[ray] = state_->end[ray] = 0;
   running_ |= 1u << ray;
+  prepared_ = false;
 }
 
 /// Finds bricks until each ray has one to cross, or there are no more.
@@ -120,14 +101,14 @@ void PacketWalk::take_next_crossings(PacketSteps& steps) {
   State& s = *state_;
   internal::BrickCrossings& c = s.crossings;
   steps.brick_count = 0;
-  for (int ray = 0; ray < rays(); ++ray) {
+  for (int ray = 0, count = rays(); ray < count; ++ray) {
     if ((running_ >> ray & 1) == 0 || s.first[ray] == s.end[ray]) {
       c.length[ray] = 0;
       c.to_exit[0][ray] = c.to_exit[1][ray] = c.to_exit[2][ray] = 0;
       continue;
     }
     const Found& found = s.found[s.waiting[ray][s.first[ray]++]];
-    const double scale = s.arc_per_depth[ray] * found.per_voxel;
+    const double scale = s.rays.arc_per_depth[ray] * found.per_voxel;
     for (int a = 0; a < 3; ++a) c.to_exit[a][ray] = found.hits.to_exit[a][ray] * scale;
     c.length[ray] = std::max(found.hits.length[ray] * scale, 1.0);
     c.local[ray] = found.brick->local.data();
@@ -138,6 +119,7 @@ void PacketWalk::take_next_crossings(PacketSteps& steps) {
 }
 
 bool PacketWalk::next(PacketSteps& steps) {
+  if (!std::exchange(prepared_, true)) internal::prepare_rays(state_->rays);
   look_for_bricks();
   take_next_crossings(steps);
   if (steps.brick_count == 0) return false;

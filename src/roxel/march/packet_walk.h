@@ -44,6 +44,7 @@ class PacketWalk {
   std::size_t next_brick_ = 0;  ///< in bricks_
   int found_ = 0;               ///< bricks found and perhaps still to be crossed
   std::uint32_t running_ = 0;   ///< bit `ray`
+  bool prepared_ = true;        ///< no ray has been added since the others were prepared
 };
 
 }  // namespace roxel
