@@ -18,6 +18,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using FloatTag = hn::CappedTag<float, kMaxPacketRays>;
 using IntTag = hn::RebindToSigned<FloatTag>;
+using UnsignedTag = hn::RebindToUnsigned<FloatTag>;
 using DoubleTag = hn::CappedTag<double, kMaxPacketRays / 2>;
 using HalfFloatTag = hn::Rebind<float, DoubleTag>;
 using HalfIntTag = hn::Rebind<std::int32_t, DoubleTag>;
@@ -172,75 +173,106 @@ HWY_INLINE int walk_cells(const PacketRays& rays, BrickCrossings& crossings) {
   return rows;
 }
 
-/// Where the voxels of each ray's brick begin: Brick::local, in bytes from the first of them.
-struct alignas(64) LocalTables {
-  const std::int32_t* base;
+/// Where each ray's BrickBits are, in bytes from those of one of them.
+struct alignas(64) BitTables {
+  const std::int32_t* base = nullptr;
   std::int32_t offset[kMaxPacketRays];
+  bool near = true;  ///< otherwise they are too far apart in memory for offsets
 };
 
-/// False where the bricks are too far apart in memory.
-HWY_INLINE bool find_tables(const BrickCrossings& crossings, LocalTables& tables) {
+HWY_INLINE void find_tables(const BrickCrossings& crossings, BitTables& tables) {
   constexpr std::int64_t kFar = std::int64_t{1} << 30;
   const char* base = nullptr;
   for (int ray = 0; ray < kRays; ++ray) {
     tables.offset[ray] = 0;
     if (crossings.count[ray] == 0) continue;
-    const char* const local = reinterpret_cast<const char*>(crossings.local[ray]);
-    if (!base) base = local;
-    const std::int64_t offset = local - base;
-    if (offset < -kFar || offset > kFar) return false;
+    const char* const bits = reinterpret_cast<const char*>(crossings.bits[ray]);
+    if (!base) base = bits;
+    const std::int64_t offset = bits - base;
+    tables.near &= offset > -kFar && offset < kFar;
     tables.offset[ray] = static_cast<std::int32_t>(offset);
   }
   tables.base = reinterpret_cast<const std::int32_t*>(base);
-  return true;
 }
 
-/// Looks all cells up, ray by ray.
-HWY_INLINE void look_up_cells(BrickCrossings& crossings) {
-  for (int ray = 0; ray < kRays; ++ray)
-    for (int row = 0; row < crossings.count[ray]; ++row)
-      crossings.found[row][ray] = crossings.local[ray][crossings.cell[row][ray]];
-}
-
-/// The same, row by row.
-HWY_INLINE void look_up_rows(const LocalTables& tables, int rows, BrickCrossings& crossings) {
+/// Finds the word of each cell's bit.
+HWY_INLINE void find_words(const BitTables& tables, int rows, BrickCrossings& crossings) {
+  static_assert(offsetof(BrickBits, word) == 0);
+  if (!tables.near) {
+    for (int ray = 0; ray < kRays; ++ray)
+      for (int row = 0; row < crossings.count[ray]; ++row)
+        crossings.word[row][ray] = crossings.bits[ray]->word[crossings.cell[row][ray] >> 5];
+    return;
+  }
   const IntTag di;
-  // An entry is two bytes: it is read with the two before it, which every table has.
-  static_assert(offsetof(Brick, local) >= 2);
-  const auto offset = hn::Sub(hn::Load(di, tables.offset), hn::Set(di, 2));
+  const auto offset = hn::Load(di, tables.offset);
   for (int row = 0; row < rows; ++row) {
-    const auto at = hn::Add(offset, hn::ShiftLeft<1>(hn::Load(di, crossings.cell[row])));
-    const auto pair = hn::BitCast(hn::RebindToUnsigned<IntTag>(), hn::GatherOffset(di, tables.base, at));
-    hn::Store(hn::BitCast(di, hn::ShiftRight<16>(pair)), di, crossings.found[row]);
+    const auto which = hn::ShiftRight<5>(hn::Load(di, crossings.cell[row]));
+    const auto at = hn::Add(offset, hn::ShiftLeft<2>(which));
+    hn::Store(hn::GatherOffset(di, tables.base, at), di,
+              reinterpret_cast<std::int32_t*>(crossings.word[row]));
   }
 }
 
-/// Keeps what exists: slot and chord; `ray` gets ray + 16 cell.
+/// Keeps what exists: chord; `slot` gets the cell's word, and `ray` ray + 16 cell.
 HWY_INLINE void keep_existing(const BrickCrossings& crossings, int rows, PacketSteps& steps) {
   const FloatTag df;
   const IntTag di;
-  const auto none = hn::Set(di, kNoVoxel);
-  const auto first_slot = hn::Load(di, crossings.first_slot);
+  const UnsignedTag du;
   const auto ray = hn::Iota(di, 0);
+  const auto in_word = hn::Set(di, 31);
+  const auto one = hn::Set(du, 1);
   int count = 0, kept_rows = 0;
   for (int row = 0; row < rows; ++row) {
-    const auto found = hn::Load(di, crossings.found[row]);
+    const auto cell = hn::Load(di, crossings.cell[row]);
+    const auto word = hn::Load(du, crossings.word[row]);
     const auto chord = hn::Load(df, crossings.chord[row]);
-    const auto exists = hn::And(hn::Ne(found, none), hn::RebindMask(di, hn::Gt(chord, hn::Zero(df))));
+    const auto bit = hn::And(hn::Shr(word, hn::BitCast(du, hn::And(cell, in_word))), one);
+    const auto exists = hn::And(hn::RebindMask(df, hn::Eq(bit, one)), hn::Gt(chord, hn::Zero(df)));
     std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(di, exists, bits);
+    hn::StoreMaskBits(df, exists, bits);
     const std::uint32_t kept = bits[0] | static_cast<std::uint32_t>(bits[1]) << 8;
-    const auto code = hn::Add(ray, hn::ShiftLeft<4>(hn::Load(di, crossings.cell[row])));
-    hn::StoreU(hn::Compress(hn::Add(first_slot, found), exists), di,
-               reinterpret_cast<std::int32_t*>(steps.slot) + count);
-    hn::StoreU(hn::Compress(chord, hn::RebindMask(df, exists)), df, steps.length + count);
-    hn::StoreU(hn::Compress(code, exists), di, steps.ray + count);
+    const auto code = hn::Add(ray, hn::ShiftLeft<4>(cell));
+    hn::StoreU(hn::Compress(word, hn::RebindMask(du, exists)), du, steps.slot + count);
+    hn::StoreU(hn::Compress(chord, exists), df, steps.length + count);
+    hn::StoreU(hn::Compress(code, hn::RebindMask(di, exists)), di, steps.ray + count);
     count += __builtin_popcount(kept);
     steps.rays[kept_rows] = kept;
     kept_rows += kept != 0;
   }
   steps.count = count;
   steps.rows = kept_rows;
+}
+
+/// Slots from words: that of the brick, and how many voxels of it come before.
+HWY_INLINE void find_slots(const BitTables& tables, const BrickCrossings& crossings, PacketSteps& steps) {
+  const IntTag di;
+  const UnsignedTag du;
+  const auto lowest = hn::Set(di, kMaxPacketRays - 1), in_word = hn::Set(di, 31);
+  const auto one = hn::Set(du, 1);
+  const auto first_slot = hn::Load(di, crossings.first_slot), offset = hn::Load(di, tables.offset);
+  // An entry is two bytes: it is read with the two before it.
+  constexpr int kBefore = offsetof(BrickBits, before) - 2;
+  const auto before_offset = hn::Set(di, kBefore);
+  for (int i = 0; i < steps.count; i += kRays) {
+    const auto code = hn::LoadU(di, steps.ray + i);
+    const auto cell = hn::And(hn::ShiftRight<4>(code), hn::Set(di, kBrickVoxels - 1));
+    const auto ray = hn::IndicesFromVec(di, hn::And(code, lowest));
+    const auto below = hn::Sub(hn::Shl(one, hn::BitCast(du, hn::And(cell, in_word))), one);
+    const auto rank = hn::PopulationCount(hn::And(hn::LoadU(du, steps.slot + i), below));
+    auto slot = hn::Add(hn::TableLookupLanes(first_slot, ray), hn::BitCast(di, rank));
+    if (tables.near) {
+      const auto at = hn::Add(hn::Add(hn::TableLookupLanes(offset, ray), before_offset),
+                              hn::ShiftLeft<1>(hn::ShiftRight<5>(cell)));
+      const auto pair = hn::BitCast(du, hn::GatherOffset(di, tables.base, at));
+      slot = hn::Add(slot, hn::BitCast(di, hn::ShiftRight<16>(pair)));
+    }
+    hn::StoreU(hn::BitCast(du, slot), du, steps.slot + i);
+  }
+  for (int i = 0; !tables.near && i < steps.count; ++i) {
+    const int code = steps.ray[i];
+    steps.slot[i] += crossings.bits[code & (kMaxPacketRays - 1)]->before[code >> 9];
+  }
 }
 
 /// Ray weights, and rays alone in `ray`.
@@ -276,28 +308,24 @@ HWY_INLINE void weigh(const PacketRays& rays, const BrickCrossings& crossings, P
   }
 }
 
-/// Fills up the last vector.
-HWY_INLINE void pad(PacketSteps& steps) {
+void walk(const PacketRays& rays, BrickCrossings& crossings, PacketSteps& steps) {
+  const int rows = walk_cells(rays, crossings);
+  BitTables tables;
+  find_tables(crossings, tables);
+  find_words(tables, rows, crossings);
+  keep_existing(crossings, rows, steps);
+  if (steps.count == 0) return;
   const FloatTag df;
   const IntTag di;
-  if (steps.count == 0) return;
+  hn::StoreU(hn::Zero(di), di, steps.ray + steps.count);  // what is read behind the count is harmless
+  find_slots(tables, crossings, steps);
+  weigh(rays, crossings, steps);
+  // The last vector is filled up.
   hn::StoreU(hn::Set(di, static_cast<std::int32_t>(steps.slot[0])), di,
              reinterpret_cast<std::int32_t*>(steps.slot) + steps.count);
   hn::StoreU(hn::Zero(df), df, steps.length + steps.count);
   hn::StoreU(hn::Zero(df), df, steps.weight + steps.count);
   hn::StoreU(hn::Zero(di), di, steps.ray + steps.count);
-}
-
-void walk(const PacketRays& rays, BrickCrossings& crossings, PacketSteps& steps) {
-  const int rows = walk_cells(rays, crossings);
-  LocalTables tables;
-  if (find_tables(crossings, tables))
-    look_up_rows(tables, rows, crossings);
-  else
-    look_up_cells(crossings);
-  keep_existing(crossings, rows, steps);
-  weigh(rays, crossings, steps);
-  pad(steps);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "roxel/march/packet_steps.h"
+#include "roxel/volume/volume.h"
 
 namespace roxel::internal {
 
@@ -42,7 +43,7 @@ struct alignas(64) BrickHits {
 struct alignas(64) BrickCrossings {
   double to_exit[3][kMaxPacketRays];  ///< as in BrickHits, in kPacketUnit of arc
   double length[kMaxPacketRays];      ///< 0: the ray crosses nothing
-  const std::uint16_t* local[kMaxPacketRays];
+  const BrickBits* bits[kMaxPacketRays];
   std::int32_t first_slot[kMaxPacketRays];
 
   // Found:
@@ -50,7 +51,7 @@ struct alignas(64) BrickCrossings {
   std::int32_t count[kMaxPacketRays];  ///< cells met
   std::int32_t cell[PacketSteps::kMaxRows][kMaxPacketRays];
   float chord[PacketSteps::kMaxRows][kMaxPacketRays];  ///< 0 where there is no cell
-  std::int32_t found[PacketSteps::kMaxRows][kMaxPacketRays];  ///< Brick::local of the cell
+  std::uint32_t word[PacketSteps::kMaxRows][kMaxPacketRays];  ///< BrickBits::word with the cell's bit
 };
 
 /// Floats in a vector: rays in a packet.

@@ -11,7 +11,8 @@ namespace roxel {
 /// A brick that rays of the packet meet.
 struct PacketWalk::Found {
   std::uint32_t number;
-  const Brick* brick;
+  const BrickBits* bits;
+  std::int32_t first_slot;
   double per_voxel;  ///< inverse of the lattice's voxel size
   internal::BrickHits hits;
 };
@@ -72,8 +73,10 @@ void PacketWalk::look_for_bricks() {
     Found& found = s.found[found_];
     const std::uint32_t number = bricks_[next_brick_++];
     const int lattice = stack_.lattice_of(number);
-    const LatticeFrame& frame = stack_.volume().index(lattice).frame();
-    const Brick& brick = stack_.brick(number);
+    const BrickIndex& index = stack_.volume().index(lattice);
+    const LatticeFrame& frame = index.frame();
+    const std::uint32_t in_lattice = number - stack_.first_brick(lattice);
+    const Brick& brick = index.bricks()[in_lattice];
     const double side = kBrickSide * frame.voxel_size;
     double lo[3], hi[3];
     for (int a = 0; a < 3; ++a) {
@@ -85,7 +88,8 @@ void PacketWalk::look_for_bricks() {
         internal::meet_brick(s.rays, lo, hi, range_.begin, range_.end, found.hits) & running_;
     if (meet == 0) continue;
     found.number = number;
-    found.brick = &brick;
+    found.bits = &index.bits()[in_lattice];
+    found.first_slot = static_cast<std::int32_t>(brick.first_slot);
     found.per_voxel = 1 / frame.voxel_size;
     for (std::uint32_t rays = meet; rays != 0; rays &= rays - 1) {
       const int ray = std::countr_zero(rays);
@@ -111,8 +115,8 @@ void PacketWalk::take_next_crossings(PacketSteps& steps) {
     const double scale = s.rays.arc_per_depth[ray] * found.per_voxel;
     for (int a = 0; a < 3; ++a) c.to_exit[a][ray] = found.hits.to_exit[a][ray] * scale;
     c.length[ray] = std::max(found.hits.length[ray] * scale, 1.0);
-    c.local[ray] = found.brick->local.data();
-    c.first_slot[ray] = static_cast<std::int32_t>(found.brick->first_slot);
+    c.bits[ray] = found.bits;
+    c.first_slot[ray] = found.first_slot;
     if (steps.brick_count == 0 || steps.bricks[steps.brick_count - 1] != found.number)
       steps.bricks[steps.brick_count++] = found.number;
   }
