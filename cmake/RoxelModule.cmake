@@ -68,6 +68,13 @@ function(roxel_module name)
   endif()
 endfunction()
 
+# Sources of the module just made that Highway compiles once for each instruction set, including them anew
+# each time. Products that are rounded before they are summed stay so.
+function(roxel_vector_kernels)
+  set_source_files_properties(${ARGN} PROPERTIES
+    COMPILE_OPTIONS "-O3;-ffp-contract=off" SKIP_UNITY_BUILD_INCLUSION ON SKIP_PRECOMPILE_HEADERS ON)
+endfunction()
+
 function(roxel_module_test name sources libraries)
   add_executable(${name}_test ${sources})
   target_link_libraries(${name}_test PRIVATE roxel_${name} ${libraries} roxel_flags

@@ -9,7 +9,7 @@ set -eu
 build="g++ cmake ninja-build python3
   libopenvdb-dev libboost-iostreams-dev zlib1g-dev libtbb-dev libeigen3-dev
   libopenimageio-dev openimageio-tools
-  libembree-dev libnova-dev libceres-dev libmeshoptimizer-dev libtinygltf-dev
+  libembree-dev libnova-dev libceres-dev libmeshoptimizer-dev libtinygltf-dev libhwy-dev
   nlohmann-json3-dev libcli11-dev libgtest-dev libgmock-dev librapidcheck-dev libopenvdb-tools"
 dev="clang-format clang-tidy ccache"
 

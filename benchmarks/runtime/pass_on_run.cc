@@ -3,8 +3,8 @@
 ///     pass_on_run DATASET RUN [IMAGES [THREADS [PASSES]]]
 ///
 /// RUN is the folder of a `roxel reconstruct DATASET` with bounds or masks (its volume.vdb holds the box, no
-/// surround). IMAGES, a pattern, keeps some of the photographs. Prints rays, steps and nanoseconds a step of
-/// PASSES passes.
+/// surround). IMAGES, a pattern, keeps some of the photographs. Prints rays, steps and nanoseconds of processor time a
+/// step of PASSES passes, of the colour and of the opacity march.
 
 #include <cstdio>
 #include <cstdlib>
@@ -40,16 +40,18 @@ void measure(const char* dataset_path, const char* run, const char* images, int 
   const Scene scene = survey(dataset, load, options, context);
   const std::vector<SampleNode> samples =
       make_samples(dataset, load, scene, scene.voxel_size, options, context);
-  std::printf("%zu images, %u voxels, %d threads\n%6s %12s %12s %9s | %12s %12s %9s %9s | %s\n",
+  std::printf("%zu images, %u voxels, %d threads\n%6s %12s %12s %9s %9s | %12s %12s %9s %9s | %s\n",
               dataset.views.size(), volume.slot_count(), threads, "pass", "color rays", "steps", "wall s",
-              "rays", "steps", "wall s", "ns/step", "mean log-likelihood");
+              "ns/step", "rays", "steps", "wall s", "ns/step", "mean log-likelihood");
   PassMemory memory;
   for (int pass = 1; pass <= passes; ++pass) {
     const PassReport report =
         run_pass(samples, pass_options(scene, options), context, nullptr, volume, nullptr, &memory);
-    std::printf("%6d %12lld %12lld %9.2f | %12lld %12lld %9.2f %9.1f | %.6f\n", pass,
+    std::printf("%6d %12lld %12lld %9.2f %9.1f | %12lld %12lld %9.2f %9.1f | %.6f\n", pass,
                 static_cast<long long>(report.color.rays), static_cast<long long>(report.color.steps),
-                report.color_seconds, static_cast<long long>(report.opacity.rays),
+                report.color_seconds,
+                1e9 * report.color_march_cpu_seconds / static_cast<double>(report.color.steps),
+                static_cast<long long>(report.opacity.rays),
                 static_cast<long long>(report.opacity.steps), report.opacity_seconds,
                 1e9 * report.opacity_march_cpu_seconds / static_cast<double>(report.opacity.steps),
                 report.opacity.log_likelihood / report.opacity.observation_weight);

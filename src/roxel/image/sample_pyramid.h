@@ -56,6 +56,15 @@ class SamplePyramid {
     return level > 0 ? stored.regions[index].valid : valid_share(index);
   }
 
+  /// Brings regions (x .. x + 7, y) near to the processor; those beyond the image do no harm.
+  void prefetch(int level, int x, int y) const {
+    const Level& stored = levels_[level - finest_level_];
+    const std::size_t index = static_cast<std::size_t>(y) * stored.width + x;
+    if (level == 0) return __builtin_prefetch(pixels_.data() + 3 * index);
+    const char* from = reinterpret_cast<const char*>(stored.regions.data() + index);
+    for (std::size_t byte = 0; byte < 8 * sizeof(RegionStats); byte += 64) __builtin_prefetch(from + byte);
+  }
+
   /// The mean interpolated between the four regions around pixel position (u, v), (0.5, 0.5) being the
   /// top-left pixel's centre. Regions count by their valid share, and by their foreground too where the
   /// region that (u, v) is in has any; beyond the border the outermost regions go on. False, and mean = 0,

@@ -1,5 +1,5 @@
 #pragma once
-/// The colour march, eight samples at a time: gives each sample to the voxels along its ray.
+/// The colour march, several samples at a time: gives each sample to the voxels along its ray.
 
 #include <vector>
 
@@ -8,15 +8,15 @@
 
 namespace roxel {
 
-/// What eight samples give, and how much of each ray gets as far.
+/// What a packet's samples give, and how much of each ray gets as far.
 struct alignas(64) ColorLanes {
   // Of a sample, in the order of VoxelScratch: mean and second moments xx .. xz; then yz and 1.
-  float low[kLanes][8] = {};
-  float high[kLanes][4] = {};
-  float weight[kLanes] = {};  ///< what a whole sample counts
-  float transmittance[kLanes] = {};
+  float low[kMaxPacketRays][8] = {};
+  float high[kMaxPacketRays][4] = {};
+  float weight[kMaxPacketRays] = {};  ///< what a whole sample counts
+  float transmittance[kMaxPacketRays] = {};
 
-  void set(int lane, const RegionStats& sample, float weight, float transmittance);
+  void set(int ray, const RegionStats& sample, float weight, float transmittance);
 };
 
 class ColorPackets {
@@ -29,7 +29,7 @@ class ColorPackets {
         walk_(stack) {}
 
   /// Adds what the tile's samples give to the scratch's voxels.
-  void tile(const ViewInSight& in_sight, const Tile& tile);
+  void tile(const ListedView& listed, const Tile& tile);
 
   PassCounts counts;
 
@@ -44,17 +44,19 @@ class ColorPackets {
   };
 
   template <class March>
-  friend void march_tile(March& march, const ViewInSight& in_sight, const Tile& tile);
+  friend void march_tile(March& march, const ListedView& listed, const Tile& tile);
   const std::vector<Sample>& samples() const { return samples_; }
   void add(const SampleView& view, const Region& region, int parent);
-  void begin(int lane, const Ray& ray, Stretch range, const Stretch* sight) {
-    walk_.begin(lane, ray, range, sight);
+  void begin(const Eigen::Vector3d& origin, Stretch range, std::span<const std::uint32_t> bricks) {
+    walk_.begin(origin, range, bricks);
   }
+  void add_ray(int ray, const Eigen::Vector3d& direction) { walk_.add(ray, direction); }
   void march(const SampleView& view, const SamplePacket& packet);
   bool divides(const SampleView& view, std::size_t sample, bool last) const;
   void divided(std::size_t, std::size_t, std::size_t) {}
   void level_done(std::size_t) {}
   bool goes_on(float transmittance) const { return everywhere_ || transmittance >= spent_; }
+  void deposit(ColorLanes& lanes);
   float sample_weight(const SampleView& view, const Region& region, const RegionStats& sample) const;
 
   const MarchOptions& options_;
@@ -62,7 +64,7 @@ class ColorPackets {
   float spent_;
   NodeScratch& scratch_;
   PacketWalk walk_;
-  StepRows steps_;
+  PacketSteps steps_;
   std::vector<Sample> samples_;
 };
 

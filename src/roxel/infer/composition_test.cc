@@ -169,71 +169,95 @@ TEST_F(Composition, StoppingEarlyLeavesOutLessThanItsBound) {
   EXPECT_GT(stopped, 50);
 }
 
-/// Eight neighbouring pixels, (x, y) .. (x + 3, y + 1).
+/// Neighbouring pixels, four a row from (x, y) on.
 struct Neighbours {
   int x, y;
-  Region region(int lane) const { return {0, x + lane % 4, y + lane / 4}; }
+  static int rows() { return std::max(PacketWalk::rays() / 4, 1); }
+  static std::vector<Neighbours> all(int size) {
+    std::vector<Neighbours> blocks;
+    for (int y = 0; y + rows() <= size; y += rows())
+      for (int x = 0; x < size; x += 4) blocks.push_back({x, y});
+    return blocks;
+  }
+  Region region(int ray) const { return {0, x + ray % 4, y + ray / 4}; }
 };
 
 class PacketComposition : public Composition {
  protected:
-  /// Of one lane: what came out and the steps.
+  struct Step {
+    std::uint32_t slot;
+    float length, weight, mean_path;
+    float share;   ///< of the likelihood
+    float before;  ///< what the steps before have of it
+
+    bool operator==(const Step&) const = default;
+  };
+  /// Of one ray: what came out and the steps.
   struct Lane {
     Segment segment;
-    std::vector<EvaluatedStep> steps;
+    std::vector<Step> steps;
   };
 
   /// Marches the neighbours that `with` lets through, as one packet.
   std::vector<Lane> march_packet(const Volume& volume, const std::vector<ColorTotals>& totals,
-                                 const Neighbours& neighbours, unsigned with = 0xff) {
+                                 const Neighbours& neighbours, unsigned with = 0xffff) {
     const LatticeStack stack(volume);
     NodeScratch scratch(stack, volume.tau);
     scratch.compare_with(totals);
     PacketMarch march(stack, scratch, model_);
-    LaneTerms terms;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const Region region = neighbours.region(lane);
-      terms.set(lane, sample_terms(view_.pyramid->at(0, region.x, region.y), model_));
-      if (with >> lane & 1) march.begin(lane, region_ray(view_, region), view_.plan.range, nullptr);
+    PacketTerms terms;
+    const std::vector<std::uint32_t> bricks = in_order(stack);
+    march.begin(view_.camera.pose.centre, view_.plan.range, bricks);
+    for (int ray = 0; ray < PacketWalk::rays(); ++ray) {
+      const Region region = neighbours.region(ray);
+      terms.set(ray, sample_terms(view_.pyramid->at(0, region.x, region.y), model_));
+      if (with >> ray & 1) march.add(ray, region_ray(view_, region).direction);
     }
-    EvaluatedRows rows;
-    const PacketSegments segments = march.march(terms, rows);
-    std::vector<Lane> lanes(kLanes);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      lanes[lane].segment = segments.of(lane);
-      for (const EvaluatedRow* row = rows.data(); row != rows.data() + rows.size(); ++row)
-        if (row->length[lane] > 0)
-          lanes[lane].steps.push_back({row->slot[lane], row->length[lane], row->weight[lane],
-                                       row->opacity[lane], row->likelihood[lane], row->mean_path[lane]});
-      EXPECT_EQ(segments.steps[lane], lanes[lane].steps.size());
-    }
+    PacketRecord record;
+    const PacketSegments segments = march.march(PacketWalk::rays(), terms, record);
+    std::vector<Lane> lanes(PacketWalk::rays());
+    for (int ray = 0; ray < PacketWalk::rays(); ++ray)
+      lanes[ray].segment = {segments.transmittance[ray], segments.likelihood[ray]};
+    for (std::size_t s = 0; s < record.size(); ++s)
+      lanes[record.ray()[s]].steps.push_back({record.slot()[s], record.length()[s], record.weight()[s],
+                                              record.mean_path()[s], record.share()[s], record.before()[s]});
     return lanes;
   }
 
-  static bool same(const EvaluatedStep& a, const EvaluatedStep& b, std::uint32_t first_slot) {
-    return a.slot == b.slot + first_slot && a.length == b.length && a.weight == b.weight &&
-           a.opacity == b.opacity && a.likelihood == b.likelihood && a.mean_path == b.mean_path;
+  /// The volume's bricks, nearest to the camera first, face by face.
+  std::vector<std::uint32_t> in_order(const LatticeStack& stack) const {
+    std::vector<std::pair<int, std::uint32_t>> sorted;
+    const Eigen::Vector3i at = (view_.camera.pose.centre / kBrickSide).array().floor().cast<int>();
+    for (std::uint32_t b = 0; b < stack.brick_count(); ++b)
+      sorted.emplace_back((stack.brick(b).coord - at).cwiseAbs().sum(), b);
+    std::sort(sorted.begin(), sorted.end());
+    std::vector<std::uint32_t> bricks;
+    for (const auto& [distance, brick] : sorted) bricks.push_back(brick);
+    return bricks;
   }
 };
 
 TEST_F(PacketComposition, LanesSayWhatSingleRaysSay) {
-  for (int block = 0; block < 32; ++block) {
-    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+  for (const Neighbours& neighbours : Neighbours::all(16)) {
     const std::vector<Lane> lanes = march_packet(volume_, totals_, neighbours);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const Region region = neighbours.region(lane);
+    for (int ray = 0; ray < PacketWalk::rays(); ++ray) {
       EvaluatedSteps steps;
-      const Segment single = march_alone(region, steps);
-      ASSERT_NEAR(lanes[lane].segment.transmittance, single.transmittance, 1e-5);
-      ASSERT_NEAR(lanes[lane].segment.likelihood, single.likelihood, 1e-5 * (1 + single.likelihood));
-      ASSERT_EQ(lanes[lane].steps.size(), steps.size());
+      const Segment single = march_alone(neighbours.region(ray), steps);
+      const Lane& lane = lanes[ray];
+      ASSERT_NEAR(lane.segment.transmittance, single.transmittance, 1e-5);
+      ASSERT_NEAR(lane.segment.likelihood, single.likelihood, 1e-5 * (1 + single.likelihood));
+      ASSERT_EQ(lane.steps.size(), steps.size());
+      Segment before;
       for (std::size_t s = 0; s < steps.size(); ++s) {
-        ASSERT_EQ(lanes[lane].steps[s].slot, steps[s].slot);
-        ASSERT_NEAR(lanes[lane].steps[s].length, steps[s].length, 1e-6);
-        ASSERT_NEAR(lanes[lane].steps[s].weight, steps[s].weight, 2e-5);
-        ASSERT_NEAR(lanes[lane].steps[s].opacity, steps[s].opacity, 1e-5 * steps[s].opacity + 1e-7);
-        ASSERT_NEAR(lanes[lane].steps[s].likelihood, steps[s].likelihood, 1e-5 * steps[s].likelihood);
-        ASSERT_NEAR(lanes[lane].steps[s].mean_path, steps[s].mean_path, 1e-5 * steps[s].mean_path + 1e-7);
+        const EvaluatedStep step = steps[s];
+        const float share = before.transmittance * step.opacity * step.likelihood;
+        ASSERT_EQ(lane.steps[s].slot, step.slot);
+        ASSERT_NEAR(lane.steps[s].length, step.length, 1e-6);
+        ASSERT_NEAR(lane.steps[s].weight, step.weight, 2e-5);
+        ASSERT_NEAR(lane.steps[s].mean_path, step.mean_path, 1e-5 * step.mean_path + 1e-7);
+        ASSERT_NEAR(lane.steps[s].share, share, 3e-5 * share + 1e-9);
+        ASSERT_NEAR(lane.steps[s].before, before.likelihood, 3e-5 * before.likelihood + 1e-9);
+        before.append(step.opacity, step.likelihood);
       }
     }
   }
@@ -241,16 +265,13 @@ TEST_F(PacketComposition, LanesSayWhatSingleRaysSay) {
 
 // Which rays share a packet is nobody's business: the same bits alone as among others.
 TEST_F(PacketComposition, ALaneDoesNotDependOnTheOthers) {
-  for (int block = 0; block < 32; ++block) {
-    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+  for (const Neighbours& neighbours : Neighbours::all(16)) {
     const std::vector<Lane> together = march_packet(volume_, totals_, neighbours);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const Lane alone = march_packet(volume_, totals_, neighbours, 1u << lane)[lane];
-      ASSERT_EQ(alone.segment.transmittance, together[lane].segment.transmittance);
-      ASSERT_EQ(alone.segment.likelihood, together[lane].segment.likelihood);
-      ASSERT_EQ(alone.steps.size(), together[lane].steps.size());
-      for (std::size_t s = 0; s < alone.steps.size(); ++s)
-        ASSERT_TRUE(same(alone.steps[s], together[lane].steps[s], 0));
+    for (int ray = 0; ray < PacketWalk::rays(); ++ray) {
+      const Lane alone = march_packet(volume_, totals_, neighbours, 1u << ray)[ray];
+      ASSERT_EQ(alone.segment.transmittance, together[ray].segment.transmittance);
+      ASSERT_EQ(alone.segment.likelihood, together[ray].segment.likelihood);
+      ASSERT_EQ(alone.steps, together[ray].steps);
     }
   }
 }
@@ -259,24 +280,28 @@ TEST_F(PacketComposition, CutAtBrickPlanesLanesAreTheSameBitForBit) {
   for (float& tau : volume_.tau) tau *= 0.1f;  // no ray may stop early in the whole and not in its parts
   std::vector<Piece> pieces;
   for (const Brick& brick : volume_.index(0).bricks()) pieces.push_back(piece_of(volume_, totals_, brick));
-  for (int block = 0; block < 32; ++block) {
-    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+  for (const Neighbours& neighbours : Neighbours::all(16)) {
     const std::vector<Lane> whole = march_packet(volume_, totals_, neighbours);
     std::vector<std::vector<Lane>> parts;
     for (const Piece& piece : pieces) parts.push_back(march_packet(piece.volume, piece.totals, neighbours));
-    for (int lane = 0; lane < kLanes; ++lane) {
+    for (int ray = 0; ray < PacketWalk::rays(); ++ray) {
       Segment folded;
       std::size_t next = 0;
       for (const std::uint32_t brick :
-           bricks_along(volume_, region_ray(view_, neighbours.region(lane)), view_.plan.range)) {
-        const Lane& part = parts[brick][lane];
+           bricks_along(volume_, region_ray(view_, neighbours.region(ray)), view_.plan.range)) {
+        const Lane& part = parts[brick][ray];
         folded = folded.then(part.segment);
-        for (const EvaluatedStep& step : part.steps)
-          ASSERT_TRUE(same(whole[lane].steps.at(next++), step, pieces[brick].first_slot));
+        for (const Step& step : part.steps) {
+          const Step& of_whole = whole[ray].steps.at(next++);
+          ASSERT_EQ(of_whole.slot, step.slot + pieces[brick].first_slot);
+          ASSERT_EQ(of_whole.length, step.length);
+          ASSERT_EQ(of_whole.weight, step.weight);
+          ASSERT_EQ(of_whole.mean_path, step.mean_path);
+        }
       }
-      ASSERT_EQ(next, whole[lane].steps.size());
-      ASSERT_EQ(folded.transmittance, whole[lane].segment.transmittance);
-      ASSERT_EQ(folded.likelihood, whole[lane].segment.likelihood);
+      ASSERT_EQ(next, whole[ray].steps.size());
+      ASSERT_EQ(folded.transmittance, whole[ray].segment.transmittance);
+      ASSERT_EQ(folded.likelihood, whole[ray].segment.likelihood);
     }
   }
 }
@@ -284,15 +309,14 @@ TEST_F(PacketComposition, CutAtBrickPlanesLanesAreTheSameBitForBit) {
 TEST_F(PacketComposition, LanesStopWhereSingleRaysStop) {
   for (float& tau : volume_.tau) tau = 3;
   int stopped = 0;
-  for (int block = 0; block < 32; ++block) {
-    const Neighbours neighbours{block % 4 * 4, block / 4 * 2};
+  for (const Neighbours& neighbours : Neighbours::all(16)) {
     const std::vector<Lane> lanes = march_packet(volume_, totals_, neighbours);
-    for (int lane = 0; lane < kLanes; ++lane) {
+    for (int ray = 0; ray < PacketWalk::rays(); ++ray) {
       EvaluatedSteps all, some;
-      march_alone(neighbours.region(lane), all);
-      march_alone(neighbours.region(lane), some, true);
+      march_alone(neighbours.region(ray), all);
+      march_alone(neighbours.region(ray), some, true);
       stopped += some.size() < all.size();
-      ASSERT_EQ(lanes[lane].steps.size(), some.size());
+      ASSERT_EQ(lanes[ray].steps.size(), some.size());
     }
   }
   EXPECT_GT(stopped, 50);

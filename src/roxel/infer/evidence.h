@@ -59,6 +59,7 @@ struct OwnColors {
   std::vector<BrickPart> bricks;
   std::vector<Entry> entries;
 
+  void clear() { bricks.clear(), entries.clear(); }
   std::size_t bytes() const { return bricks.size() * sizeof(BrickPart) + entries.size() * sizeof(Entry); }
 };
 

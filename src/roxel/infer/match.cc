@@ -58,40 +58,36 @@ struct LinearAgreement {
 
 template <class Function>
 inline __attribute__((always_inline)) void evaluate_with(const Function& agreement_of,
-                                                         const MatchModel& model, const LaneTerms& samples,
-                                                         int count, MatchBlock& block) {
-  const LaneTerms terms = samples;  // what nothing else can change stays in registers
+                                                         const MatchModel& model, int count,
+                                                         MatchBlock& block) {
   const float outlier = model.outlier, half = model.evidence_half, uninformative = model.uninformative;
   // Whole rows of lanes: what lies behind the count is computed and left unread.
-  for (int first = 0; first < count; first += kLanes)
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const int i = first + lane;
-      const float x = block.tau[i] * block.length[i];
-      const float a = one_minus_exp(x);
-      block.opacity[i] = a;
-      block.mean_path[i] = block.length[i] * mean_path_core(x, a);
-      const auto cov = [&](int c) __attribute__((always_inline)) {
-        return block.cov[c][i] + terms.cov_plus_noise[c][lane];
-      };
-      const float matched = agreement_of(block.diff[0][i], block.diff[1][i], block.diff[2][i], cov(0), cov(1),
-                                         cov(2), cov(3), cov(4), cov(5));
-      const float w = block.evidence[i];
-      const float mixed = (w * matched + half * uninformative) / (w + half + 1e-30f);
-      block.likelihood[i] = terms.foreground[lane] * mixed + outlier;
-    }
+  const int padded = (count + kLanes - 1) / kLanes * kLanes;
+  for (int i = 0; i < padded; ++i) {
+    const float x = block.tau[i] * block.length[i];
+    const float a = one_minus_exp(x);
+    block.opacity[i] = a;
+    block.mean_path[i] = block.length[i] * mean_path_core(x, a);
+    const float matched =
+        agreement_of(block.diff[0][i], block.diff[1][i], block.diff[2][i], block.cov[0][i], block.cov[1][i],
+                     block.cov[2][i], block.cov[3][i], block.cov[4][i], block.cov[5][i]);
+    const float w = block.evidence[i];
+    const float mixed = (w * matched + half * uninformative) / (w + half + 1e-30f);
+    block.likelihood[i] = block.foreground[i] * mixed + outlier;
+  }
 }
 
-ROXEL_KERNEL void evaluate_gaussian(const GaussianAgreement& agreement_of, const MatchModel& model,
-                                    const LaneTerms& samples, int count, MatchBlock& block) {
-  evaluate_with(agreement_of, model, samples, count, block);
+ROXEL_KERNEL void evaluate_gaussian(const GaussianAgreement& agreement_of, const MatchModel& model, int count,
+                                    MatchBlock& block) {
+  evaluate_with(agreement_of, model, count, block);
 }
 ROXEL_KERNEL void evaluate_exponential(const ExponentialAgreement& agreement_of, const MatchModel& model,
-                                       const LaneTerms& samples, int count, MatchBlock& block) {
-  evaluate_with(agreement_of, model, samples, count, block);
+                                       int count, MatchBlock& block) {
+  evaluate_with(agreement_of, model, count, block);
 }
-ROXEL_KERNEL void evaluate_linear(const LinearAgreement& agreement_of, const MatchModel& model,
-                                  const LaneTerms& samples, int count, MatchBlock& block) {
-  evaluate_with(agreement_of, model, samples, count, block);
+ROXEL_KERNEL void evaluate_linear(const LinearAgreement& agreement_of, const MatchModel& model, int count,
+                                  MatchBlock& block) {
+  evaluate_with(agreement_of, model, count, block);
 }
 
 GaussianAgreement gaussian_of(const MatchModel& model) {
@@ -99,16 +95,6 @@ GaussianAgreement gaussian_of(const MatchModel& model) {
 }
 
 }  // namespace
-
-LaneTerms::LaneTerms(const SampleTerms& sample) {
-  for (int lane = 0; lane < kLanes; ++lane) set(lane, sample);
-}
-
-void LaneTerms::set(int lane, const SampleTerms& sample) {
-  for (int c = 0; c < 3; ++c) mean[c][lane] = sample.mean[c];
-  for (int c = 0; c < 6; ++c) cov_plus_noise[c][lane] = sample.cov_plus_noise[c];
-  foreground[lane] = sample.foreground;
-}
 
 SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model) {
   SampleTerms terms;
@@ -119,14 +105,14 @@ SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model) {
   return terms;
 }
 
-void evaluate_match(const MatchModel& model, const LaneTerms& samples, int count, MatchBlock& block) {
+void evaluate_match(const MatchModel& model, int count, MatchBlock& block) {
   switch (model.agreement) {
     case Agreement::kGaussian:
-      return evaluate_gaussian(gaussian_of(model), model, samples, count, block);
+      return evaluate_gaussian(gaussian_of(model), model, count, block);
     case Agreement::kExponential:
-      return evaluate_exponential({1 / (model.scale * model.scale)}, model, samples, count, block);
+      return evaluate_exponential({1 / (model.scale * model.scale)}, model, count, block);
     case Agreement::kLinear:
-      return evaluate_linear({1 / model.scale}, model, samples, count, block);
+      return evaluate_linear({1 / model.scale}, model, count, block);
   }
 }
 

@@ -6,6 +6,7 @@
 #include "roxel/base/fast_exp.h"
 #include "roxel/base/lanes.h"
 #include "roxel/image/sample_pyramid.h"
+#include "roxel/march/packet_steps.h"
 
 namespace roxel {
 
@@ -34,24 +35,13 @@ struct SampleTerms {
 
 SampleTerms sample_terms(const RegionStats& sample, const MatchModel& model);
 
-/// The terms of the samples that the entries of a block belong to: entry i to lane i % kLanes.
-struct alignas(32) LaneTerms {
-  float mean[3][kLanes] = {};
-  float cov_plus_noise[6][kLanes] = {};
-  float foreground[kLanes] = {};
-
-  LaneTerms() = default;
-  /// One sample in all lanes.
-  explicit LaneTerms(const SampleTerms& sample);
-  void set(int lane, const SampleTerms& sample);
-};
-
-/// Structure of arrays for up to kSize voxels along a ray, or kSize / kLanes along each of kLanes rays: the
-/// inputs are gathered, the outputs computed.
+/// Structure of arrays for up to kSize voxels, each with the sample that it is compared with: the inputs are
+/// gathered, the outputs computed.
 struct alignas(64) MatchBlock {
-  static constexpr int kSize = 64;
+  static constexpr int kSize = PacketSteps::kPadded;
   float diff[3][kSize];     ///< in: voxel mean minus sample mean
-  float cov[6][kSize];      ///< in: voxel covariance
+  float cov[6][kSize];      ///< in: the voxel's covariance, the sample's and the noise's, summed
+  float foreground[kSize];  ///< in: share of the sample that is object
   float evidence[kSize];    ///< in: weight w of the voxel's colour evidence
   float tau[kSize];         ///< in: optical depth of one voxel length
   float length[kSize];      ///< in: chord in voxel lengths
@@ -60,11 +50,8 @@ struct alignas(64) MatchBlock {
   float likelihood[kSize];  ///< out: p
 };
 
-/// Fills the outputs of the first `count` entries.
-void evaluate_match(const MatchModel& model, const LaneTerms& samples, int count, MatchBlock& block);
-inline void evaluate_match(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block) {
-  evaluate_match(model, LaneTerms(sample), count, block);
-}
+/// Fills the outputs of the first `count` entries, at most kSize.
+void evaluate_match(const MatchModel& model, int count, MatchBlock& block);
 
 /// Agreement of two Gaussians in (0, 1] (or the baseline's value), one pair at a time; the slow twin of the
 /// block.

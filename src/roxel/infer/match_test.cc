@@ -8,6 +8,7 @@
 #include <random>
 
 #include "roxel/color/color_gaussian.h"
+#include "roxel/infer/gather.h"
 #include "roxel/infer/pass_twin.h"
 
 namespace roxel {
@@ -77,6 +78,16 @@ MatchBlock block_with(float tau, float length) {
   return block;
 }
 
+/// Evaluates voxels whose covariances and differences of means the block has, against one sample.
+void evaluate(const MatchModel& model, const SampleTerms& sample, int count, MatchBlock& block) {
+  const MatchBlock before = block;
+  SampleTerms spread = sample;
+  std::fill(spread.mean, spread.mean + 3, 0.0f);
+  bring_in_sample(spread, count, block);
+  evaluate_match(model, count, block);
+  std::copy(&before.cov[0][0], &before.cov[0][0] + 6 * MatchBlock::kSize, &block.cov[0][0]);
+}
+
 const SampleTerms kPlainSample{{0, 0, 0}, {16, 16, 16, 0, 0, 0}, 1};
 
 /// Mean of t over [0, length] with density proportional to exp(-tau t), by Simpson's rule.
@@ -95,7 +106,7 @@ TEST(EvaluateMatch, MeanPathIsTheMeanOfWhereRaysEnd) {
   for (const double length : {0.05, 0.7, 1.0, 1.7})
     for (double tau = 1e-4; tau < 16; tau *= 1.15) {
       MatchBlock block = block_with(static_cast<float>(tau), static_cast<float>(length));
-      evaluate_match({}, kPlainSample, 1, block);
+      evaluate({}, kPlainSample, 1, block);
       const double expected = integrated_mean_path(tau, length);
       // 1/x - (1-a)/a loses up to 1/x of a unit where it is not a series: x >= 0.5.
       EXPECT_NEAR(block.mean_path[0], expected, 3e-6 * length) << tau << " " << length;
@@ -104,14 +115,14 @@ TEST(EvaluateMatch, MeanPathIsTheMeanOfWhereRaysEnd) {
 
 TEST(EvaluateMatch, MeanPathAtTheEnds) {
   MatchBlock block = block_with(0, 1.5f);
-  evaluate_match({}, kPlainSample, 1, block);
+  evaluate({}, kPlainSample, 1, block);
   EXPECT_FLOAT_EQ(block.mean_path[0], 0.75f);
   EXPECT_EQ(block.opacity[0], 0);
   block = block_with(16, 1.7f);
-  evaluate_match({}, kPlainSample, 1, block);
+  evaluate({}, kPlainSample, 1, block);
   EXPECT_NEAR(block.mean_path[0], 1 / 16.0, 1e-6);
   block = block_with(3, 0);  // a chord that only touches
-  evaluate_match({}, kPlainSample, 1, block);
+  evaluate({}, kPlainSample, 1, block);
   EXPECT_EQ(block.opacity[0], 0);
   EXPECT_EQ(block.mean_path[0], 0);
 }
@@ -175,7 +186,7 @@ TEST(EvaluateMatch, GaussianIsTheAgreementOfColorGaussians) {
   const GaussianAgreement agreement_of(4);
   for (unsigned seed = 0; seed < 50; ++seed) {
     RandomBlock random(model, seed, 5);
-    evaluate_match(model, random.terms, MatchBlock::kSize, random.block);
+    evaluate(model, random.terms, MatchBlock::kSize, random.block);
     ColorGaussian sample;
     std::copy(random.sample.mean, random.sample.mean + 3, sample.mean);
     std::copy(random.sample.cov, random.sample.cov + 6, sample.cov);
@@ -194,7 +205,7 @@ TEST(EvaluateMatch, EveryAgreementIsItsFormulaInDoubles) {
     model.noise_variance[1] = 9;
     for (unsigned seed = 0; seed < 30; ++seed) {
       RandomBlock random(model, seed, 3);
-      evaluate_match(model, random.terms, MatchBlock::kSize, random.block);
+      evaluate(model, random.terms, MatchBlock::kSize, random.block);
       for (int i = 0; i < MatchBlock::kSize; ++i) {
         const Eigen::Vector3d d(random.block.diff[0][i], random.block.diff[1][i], random.block.diff[2][i]);
         const double matched =
@@ -210,7 +221,7 @@ TEST(EvaluateMatch, EveryAgreementIsItsFormulaInDoubles) {
 TEST(EvaluateMatch, OpacityIsThatOfTheChord) {
   const MatchModel model;
   RandomBlock random(model, 7, 3);
-  evaluate_match(model, random.terms, MatchBlock::kSize, random.block);
+  evaluate(model, random.terms, MatchBlock::kSize, random.block);
   for (int i = 0; i < MatchBlock::kSize; ++i) {
     const double expected = -std::expm1(-static_cast<double>(random.block.tau[i]) * random.block.length[i]);
     EXPECT_NEAR(random.block.opacity[i], expected, 1e-6 * expected);
@@ -226,7 +237,7 @@ TEST(EvaluateMatch, OnePairAtATimeIsTheBlock) {
     model.outlier = 0;
     RandomBlock random(model, 8, 3);
     random.terms.foreground = 1;
-    evaluate_match(model, random.terms, MatchBlock::kSize, random.block);
+    evaluate(model, random.terms, MatchBlock::kSize, random.block);
     for (int i = 0; i < MatchBlock::kSize; ++i) {
       float d[3], s[6];
       for (int c = 0; c < 3; ++c) d[c] = random.block.diff[c][i];
@@ -241,15 +252,15 @@ TEST(EvaluateMatch, WithoutEvidenceAVoxelIsUninformative) {
   model.uninformative = 0.003f;
   MatchBlock block = block_with(1, 1);
   block.evidence[0] = 0;
-  evaluate_match(model, kPlainSample, 1, block);
+  evaluate(model, kPlainSample, 1, block);
   EXPECT_FLOAT_EQ(block.likelihood[0], 0.003f + 1e-7f);
   block.evidence[0] = model.evidence_half;  // half its own colour (agreement 1 without spread), half p_0
   for (int c = 0; c < 3; ++c) block.cov[c][0] = 0;
-  evaluate_match(model, kPlainSample, 1, block);
+  evaluate(model, kPlainSample, 1, block);
   EXPECT_FLOAT_EQ(block.likelihood[0], 0.5f + 0.0015f + 1e-7f);
   model.evidence_half = 0;  // no prediction: no evidence, no agreement
   block.evidence[0] = 0;
-  evaluate_match(model, kPlainSample, 1, block);
+  evaluate(model, kPlainSample, 1, block);
   EXPECT_FLOAT_EQ(block.likelihood[0], 1e-7f);
 }
 
@@ -258,7 +269,7 @@ TEST(EvaluateMatch, ColoursFarApartNeverFallBelowTheOutlierFloor) {
   model.evidence_half = 0;
   MatchBlock block = block_with(1, 1);
   block.diff[0][0] = 2000;
-  evaluate_match(model, kPlainSample, 1, block);
+  evaluate(model, kPlainSample, 1, block);
   EXPECT_GE(block.likelihood[0], 1e-7f);
   EXPECT_LT(block.likelihood[0], 1.001e-7f);
 }
@@ -276,7 +287,7 @@ TEST(EvaluateMatch, LargeThinSpreadsStayNumbers) {
     const float cov[6] = {v[0] * v[0], v[1] * v[1], v[2] * v[2], v[0] * v[1], v[0] * v[2], v[1] * v[2]};
     for (int c = 0; c < 6; ++c) block.cov[c][0] = cov[c];
     for (int c = 0; c < 3; ++c) block.diff[c][0] = 0.01f * v[c];
-    evaluate_match(model, kPlainSample, 1, block);
+    evaluate(model, kPlainSample, 1, block);
     ASSERT_TRUE(std::isfinite(block.likelihood[0])) << v[0] << " " << v[1] << " " << v[2];
     ASSERT_GT(block.likelihood[0], 0);
     ASSERT_LE(block.likelihood[0], 1.001f);

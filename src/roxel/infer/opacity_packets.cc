@@ -17,14 +17,14 @@ bool OpacityPackets::serves(const MarchOptions& options) {
          !filters.interpolate;
 }
 
-void OpacityPackets::tile(const ViewInSight& in_sight, const Tile& tile) {
-  const SampleView& view = in_sight.view;
+void OpacityPackets::tile(const ListedView& listed, const Tile& tile) {
+  const SampleView& view = listed.view;
   samples_.clear();
   roots_ = 0;
   packets_.clear();
   levels_.clear();
-  rows_.clear();
-  march_tile(*this, in_sight, tile);
+  record_.clear();
+  march_tile(*this, listed, tile);
 
   look_behind(view);
   for (std::size_t i = 0; i < roots_; ++i) {
@@ -35,10 +35,6 @@ void OpacityPackets::tile(const ViewInSight& in_sight, const Tile& tile) {
   distribute();
 }
 
-RegionStats OpacityPackets::stats_of(const SampleView& view, const Sample& sample) {
-  return view.pyramid->at(sample.region.level, sample.region.x, sample.region.y);
-}
-
 /// Adds the region's sample, unless it has no valid pixels.
 void OpacityPackets::add(const SampleView& view, const Region& region, int parent) {
   const float valid = view.pyramid->valid(region.level, region.x, region.y);
@@ -47,20 +43,17 @@ void OpacityPackets::add(const SampleView& view, const Region& region, int paren
   if (parent < 0) roots_ = samples_.size();
 }
 
-/// Marches the rays begun, and keeps the packet with its rows.
+/// Marches the rays begun, and keeps the packet with its steps.
 void OpacityPackets::march(const SampleView& view, const SamplePacket& begun) {
-  Packet packet{begun, rows_.size(), 0};
-  LaneTerms terms;
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const Sample& sample = samples_[packet.sample[std::min(lane, packet.count - 1)]];
-    terms.set(lane, sample_terms(stats_of(view, sample), options_.model));
-  }
-  const PacketSegments segments = march_.march(terms, rows_);
-  packet.end_row = rows_.size();
-  for (int lane = 0; lane < packet.count; ++lane) {
-    samples_[packet.sample[lane]].own = segments.of(lane);
-    counts.steps += segments.steps[lane];
-  }
+  Packet packet{begun, record_.size(), 0};
+  PacketTerms terms;
+  for (int ray = 0; ray < packet.count; ++ray)
+    terms.set(ray, sample_terms(stats_of(view, samples_[packet.sample[ray]]), options_.model));
+  const PacketSegments segments = march_.march(packet.count, terms, record_);
+  packet.end_step = record_.size();
+  for (int ray = 0; ray < packet.count; ++ray)
+    samples_[packet.sample[ray]].own = {segments.transmittance[ray], segments.likelihood[ray]};
+  counts.steps += packet.end_step - packet.first_step;
   counts.rays += packet.count;
   packets_.push_back(packet);
 }
@@ -104,26 +97,23 @@ void OpacityPackets::distribute() {
 }
 
 void OpacityPackets::give_out(const Packet& packet) {
-  PacketReach lanes;
+  PacketReach rays;
   bool any_reach = false;
-  for (int lane = 0; lane < packet.count; ++lane) {
-    const Sample& sample = samples_[packet.sample[lane]];
-    lanes.reach[lane] = sample.reach;
-    lanes.z[lane] = sample.z;
-    lanes.weight[lane] = sample.weight;
+  for (int ray = 0; ray < packet.count; ++ray) {
+    const Sample& sample = samples_[packet.sample[ray]];
+    if (sample.z <= 0) continue;
+    rays.reach[ray] = sample.reach;
+    rays.scale[ray] = sample.reach / sample.z;
+    rays.weight[ray] = sample.weight;
     any_reach |= sample.reach > 0;
   }
-  if (!any_reach) return;
-  march_.distribute(rows_.data() + packet.first_row, rows_.data() + packet.end_row, options_.ray_weights,
-                    lanes);
-  for (int lane = 0; lane < packet.count; ++lane)
-    samples_[packet.sample[lane]].transmittance = lanes.transmittance[lane];
+  if (any_reach) march_.give_out(record_, packet.first_step, packet.end_step, options_.ray_weights, rays);
 }
 
 /// Hands what a sample's stretch leaves on to its children.
 void OpacityPackets::hand_on(const Sample& sample) {
   if (sample.z <= 0) return;
-  const float onward = sample.reach * sample.transmittance * sample.behind / sample.z;
+  const float onward = sample.reach * sample.own.transmittance * sample.behind / sample.z;
   if (onward <= kNothing) return;
   for (int c = sample.first_child; c < sample.end_child; ++c) samples_[c].reach = onward;
 }

@@ -1,5 +1,5 @@
 #pragma once
-/// The opacity march of the posterior rule without filters, eight samples at a time. A tile's samples divide
+/// The opacity march of the posterior rule without filters, several samples at a time. A tile's samples divide
 /// level by level, so that the samples of a packet are neighbours of one size.
 
 #include <vector>
@@ -18,7 +18,7 @@ class OpacityPackets {
   static bool serves(const MarchOptions& options);
 
   /// Adds what the tile's root samples say to the scratch's voxels.
-  void tile(const ViewInSight& in_sight, const Tile& tile);
+  void tile(const ListedView& listed, const Tile& tile);
 
   PassCounts counts;
 
@@ -26,18 +26,17 @@ class OpacityPackets {
   /// One sample of a tile; those that it divides into are samples_[first_child, end_child).
   struct Sample {
     Region region;
-    float weight;             ///< observation weight
-    Segment own = {};         ///< of its stretch
-    float behind = 0;         ///< leaves: p_bg; others: product of Z_c^{share}
-    float z = 0;              ///< of its own stretch and what is behind it
-    float reach = 0;          ///< probability of getting as far as its stretch
-    float transmittance = 1;  ///< of its stretch, as given out
-    bool ends = false;        ///< nothing is behind but background
+    float weight;      ///< observation weight
+    Segment own = {};  ///< of its stretch
+    float behind = 0;  ///< leaves: p_bg; others: product of Z_c^{share}
+    float z = 0;       ///< of its own stretch and what is behind it
+    float reach = 0;    ///< probability of getting as far as its stretch
+    bool ends = false;  ///< nothing is behind but background
     int first_child = 0, end_child = 0;
   };
   /// Samples that were marched together, and their steps.
   struct Packet : SamplePacket {
-    std::size_t first_row, end_row;
+    std::size_t first_step, end_step;
   };
   /// Samples and packets of one pyramid level.
   struct Level {
@@ -45,18 +44,21 @@ class OpacityPackets {
   };
 
   template <class March>
-  friend void march_tile(March& march, const ViewInSight& in_sight, const Tile& tile);
+  friend void march_tile(March& march, const ListedView& listed, const Tile& tile);
   const std::vector<Sample>& samples() const { return samples_; }
   void add(const SampleView& view, const Region& region, int parent);
-  void begin(int lane, const Ray& ray, Stretch range, const Stretch* sight) {
-    march_.begin(lane, ray, range, sight);
+  void begin(const Eigen::Vector3d& origin, Stretch range, std::span<const std::uint32_t> bricks) {
+    march_.begin(origin, range, bricks);
   }
+  void add_ray(int ray, const Eigen::Vector3d& direction) { march_.add(ray, direction); }
   void march(const SampleView& view, const SamplePacket& packet);
   bool divides(const SampleView& view, std::size_t sample, bool last);
   void divided(std::size_t sample, std::size_t first_child, std::size_t end_child);
   void level_done(std::size_t end_sample) { levels_.push_back({end_sample, packets_.size()}); }
 
-  static RegionStats stats_of(const SampleView& view, const Sample& sample);
+  static RegionStats stats_of(const SampleView& view, const Sample& sample) {
+    return view.pyramid->at(sample.region.level, sample.region.x, sample.region.y);
+  }
   void look_behind(const SampleView& view);
   void distribute();
   void give_out(const Packet& packet);
@@ -68,7 +70,7 @@ class OpacityPackets {
   std::size_t roots_ = 0;  ///< samples that are nobody's children: the first ones
   std::vector<Packet> packets_;
   std::vector<Level> levels_;
-  EvaluatedRows rows_;
+  PacketRecord record_;
 };
 
 }  // namespace roxel

@@ -1,7 +1,9 @@
 #pragma once
 /// How the packet marches take a tile: its root samples and what they divide into, level by level, so that
-/// the eight samples of a packet are neighbours of one size.
+/// the samples of a packet are neighbours of one size.
 
+#include <algorithm>
+#include <span>
 #include <vector>
 
 #include "roxel/infer/sample_view.h"
@@ -13,41 +15,50 @@ namespace roxel {
 /// The samples of one pyramid level that are marched together: indices into the samples.
 struct SamplePacket {
   int count = 0;
-  int sample[kLanes];
+  int sample[kMaxPacketRays];
 };
 
 /// Marches a tile's samples. What `March` has:
 /// - samples(), each with its `region`;
 /// - add(view, region, parent): appends a sample where there is one; a parent below 0 makes it a root;
-/// - begin(lane, ray, range, sight), eight times at most, then march(view, packet): the rays begun;
+/// - begin(origin, range, bricks) and add_ray(ray, direction) as PacketWalk, then march(view, packet);
 /// - divides(view, sample, last): whether anything behind the sample matters;
 /// - divided(sample, first_child, end_child): once its children are added;
 /// - level_done(end_sample): once all of a level are marched and divided.
 template <class March>
-void march_tile(March& march, const ViewInSight& in_sight, const Tile& tile) {
-  const SampleView& view = in_sight.view;
+void march_tile(March& march, const ListedView& listed, const Tile& tile) {
+  const SampleView& view = listed.view;
   constexpr int kNoParent = -1;
-  // Blocks of 4 x 2 make packets of close neighbours.
-  for (int y = tile.y0; y < tile.y1; y += 2)
-    for (int x = tile.x0; x < tile.x1; x += 4)
-      for (int i = 0; i < kLanes; ++i)
-        if (x + i % 4 < tile.x1 && y + i / 4 < tile.y1)
-          march.add(view, {view.plan.root_level, x + i % 4, y + i / 4}, kNoParent);
+  // Square blocks, or nearly, make packets of close neighbours.
+  constexpr int kBlock = 4;
+  const int rows = std::max(PacketWalk::rays() / kBlock, 1);
+  for (int y = tile.y0; y < tile.y1; y += rows)
+    for (int x = tile.x0; x < tile.x1; x += kBlock)
+      for (int i = 0; i < kBlock * rows; ++i)
+        if (x + i % kBlock < tile.x1 && y + i / kBlock < tile.y1)
+          march.add(view, {view.plan.root_level, x + i % kBlock, y + i / kBlock}, kNoParent);
 
-  const auto march_level = [&](std::size_t first, std::size_t end, Stretch range) {
+  const auto march_level = [&](int level, std::size_t first, std::size_t end, Stretch range) {
     if (range.end <= range.begin) return;
     SamplePacket packet;
+    std::span<const std::uint32_t> bricks;
     const auto flush = [&] {
       if (packet.count > 0) march.march(view, packet);
       packet.count = 0;
     };
     for (std::size_t i = first; i < end; ++i) {
-      const Eigen::Vector2d at = region_centre(view, march.samples()[i].region);
-      const Stretch* sight = in_sight.sight.within(at.x(), at.y(), range);
-      if (!sight) continue;
-      march.begin(packet.count, view.camera.ray(at.x(), at.y()), range, sight);
+      const Region& region = march.samples()[i].region;
+      const std::span<const std::uint32_t> here = listed.lists.at(level, region.x, region.y);
+      if (here.empty()) continue;
+      if (here.data() != bricks.data()) flush();
+      if (packet.count == 0) {
+        bricks = here;
+        march.begin(view.camera.pose.centre, range, bricks);
+      }
+      const Eigen::Vector2d at = region_centre(view, region);
+      march.add_ray(packet.count, listed.direction_from_pixel * Eigen::Vector3d(at.x(), at.y(), 1));
       packet.sample[packet.count++] = static_cast<int>(i);
-      if (packet.count == kLanes) flush();
+      if (packet.count == PacketWalk::rays()) flush();
     }
     flush();
   };
@@ -57,7 +68,7 @@ void march_tile(March& march, const ViewInSight& in_sight, const Tile& tile) {
   for (int level = view.plan.root_level; first < march.samples().size(); --level) {
     const Stretch range = served_range(view, {level, 0, 0}, begin);
     const std::size_t end = march.samples().size();
-    march_level(first, end, range);
+    march_level(level, first, end, range);
     const bool last = range.end >= view.plan.range.end || level == view.plan.finest_level;
     for (std::size_t i = first; i < end; ++i) {
       if (!march.divides(view, i, last)) continue;

@@ -202,9 +202,8 @@ TEST(RunPass, OpaqueVolumesDifferByTheEarlyStopAtMost) {
   PassTwin twin(volume, options);
   twin.run(nodes);
   run_pass(nodes, options, RunContext(1), nullptr, volume);
-  // A ray leaves out at most 1e-4 of itself; up to about 100 cross a voxel, over a weight of at least beta
-  // = 5.
-  EXPECT_LE(difference(volume, twin).tau, 100 * 1e-4 / 5);
+  // Up to about 100 rays cross a voxel, over a weight of at least beta = 5.
+  EXPECT_LE(difference(volume, twin).tau, 100 * SegmentMarch::kNegligible / 5);
 }
 
 }  // namespace

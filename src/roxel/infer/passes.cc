@@ -180,8 +180,8 @@ class OpacityMarch {
 PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
                        bool everywhere, const RunContext& context, NodeScratch& scratch) {
   ColorPackets packets(stack, options, everywhere, scratch);
-  for_each_tile(stack, node, context,
-                [&](const ViewInSight& in_sight, const Tile& tile) { packets.tile(in_sight, tile); });
+  for_each_tile<ListedView>(stack, node, context,
+                            [&](const ListedView& view, const Tile& tile) { packets.tile(view, tile); });
   return packets.counts;
 }
 
@@ -189,8 +189,8 @@ PassCounts march_opacity(const LatticeStack& stack, const SampleNode& node, cons
                          const RunContext& context, NodeScratch& scratch) {
   if (OpacityPackets::serves(options)) {
     OpacityPackets packets(stack, options, scratch);
-    for_each_tile(stack, node, context,
-                  [&](const ViewInSight& in_sight, const Tile& tile) { packets.tile(in_sight, tile); });
+    for_each_tile<ListedView>(stack, node, context,
+                              [&](const ListedView& view, const Tile& tile) { packets.tile(view, tile); });
     return packets.counts;
   }
   OpacityMarch march(stack, options, scratch);

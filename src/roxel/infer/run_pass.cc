@@ -79,16 +79,21 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
   used.set_workers(context.thread_count());
   colors.totals.clear_color();
   colors.kept.clear();
+  std::vector<double> march_seconds(context.thread_count(), 0.0);
   const PassCounts counts = sum(for_each_node(nodes, context, progress, 0, 0.3, [&](int node, int worker) {
     NodeScratch& scratch = used.scratch(worker, stack, stack.volume().tau);
+    const SampleNode views = resident(nodes[node]);
+    const double march_start = thread_seconds();
     const PassCounts node_counts =
-        march_color(stack, resident(nodes[node]), options.opacity, options.everywhere, context, scratch);
+        march_color(stack, views, options.opacity, options.everywhere, context, scratch);
+    march_seconds[worker] += thread_seconds() - march_start;
     OwnColors* own = options.predictive ? colors.kept.room_for(node) : nullptr;
     colors.totals.add_color(stack, scratch, own);
     if (own) colors.kept.keep(node);
     return node_counts;
   }));
   colors_of(colors.totals.color, context.thread_count(), colors.of_totals);
+  colors.march_cpu_seconds = std::accumulate(march_seconds.begin(), march_seconds.end(), 0.0);
   return counts;
 }
 
@@ -105,21 +110,32 @@ KeptColors::KeptColors(std::size_t node_count, std::size_t limit_bytes)
     : limit_bytes_(static_cast<std::int64_t>(limit_bytes)), left_bytes_(limit_bytes_), nodes_(node_count) {}
 
 void KeptColors::clear() {
-  left_bytes_ = limit_bytes_;
-  for (Node& node : nodes_) node = {};  // or nodes that get no room next time would hold on to theirs
+  // What nodes hold is theirs until they are asked again: memory that is given back is taken anew page by page.
+  std::int64_t held = 0;
+  for (Node& node : nodes_) {
+    node.kept = false;
+    node.colors.clear();
+    held += static_cast<std::int64_t>(node.held_bytes);
+  }
+  left_bytes_ = limit_bytes_ - held;
 }
 
 OwnColors* KeptColors::room_for(std::size_t node) {
-  if (left_bytes_ <= 0) return nullptr;
+  if (limit_bytes_ <= 0 || (left_bytes_ <= 0 && nodes_[node].held_bytes == 0)) return nullptr;
   return &nodes_[node].colors;
 }
 
 void KeptColors::keep(std::size_t node) {
-  const std::int64_t bytes = static_cast<std::int64_t>(nodes_[node].colors.bytes());
-  nodes_[node].kept = left_bytes_.fetch_sub(bytes) >= bytes;
-  if (nodes_[node].kept) return;
-  left_bytes_ += bytes;
-  nodes_[node].colors = {};
+  Node& n = nodes_[node];
+  const auto held = static_cast<std::int64_t>(n.held_bytes);
+  const auto more = std::max<std::int64_t>(static_cast<std::int64_t>(n.colors.bytes()) - held, 0);
+  n.kept = left_bytes_.fetch_sub(more) >= more;
+  if (n.kept) {
+    n.held_bytes += static_cast<std::size_t>(more);
+    return;
+  }
+  left_bytes_ += more + held;
+  n = {};
 }
 
 CollectedColors& PassMemory::colors(std::uint32_t slot_count, std::size_t node_count,
@@ -152,6 +168,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   auto start = Clock::now();
   report.color = collect_color(stack, nodes, options, context, progress, colors, &used);
   report.color_seconds = seconds_since(start);
+  report.color_march_cpu_seconds = colors.march_cpu_seconds;
 
   start = Clock::now();
   totals.clear_opacity();
@@ -167,7 +184,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
     return counts;
   }));
   report.opacity_seconds = seconds_since(start);
-  for (const double seconds : march_seconds) report.opacity_march_cpu_seconds += seconds;
+  report.opacity_march_cpu_seconds = std::accumulate(march_seconds.begin(), march_seconds.end(), 0.0);
 
   const std::vector<float> field = prior_opacity_field(volume, options.prior, context.thread_count());
   report.prior_log_likelihood = log_prior(volume, field, options.prior.strength);

@@ -21,6 +21,7 @@ struct PassReport {
   PassCounts opacity;
   double color_seconds = 0;    ///< wall time of the colour marches that make the totals
   double opacity_seconds = 0;  ///< wall time of the opacity marches, with the node's own colours again
+  double color_march_cpu_seconds = 0;    ///< summed over workers, of the march that makes the totals alone
   double opacity_march_cpu_seconds = 0;  ///< summed over workers, of march_opacity alone
   double prior_log_likelihood = 0;       ///< log prior of tau given the field used, up to a constant
 };
@@ -33,7 +34,7 @@ using PassProgress = std::function<void(double fraction)>;
 class KeptColors {
  public:
   KeptColors(std::size_t node_count, std::size_t limit_bytes);
-  /// Forgets all colours.
+  /// Forgets all colours, but not the memory that they lay in.
   void clear();
   /// Where a node's colours may be put, empty, or null without room. Then say keep(node). Safe from several
   /// threads for different nodes, at most once a node.
@@ -47,6 +48,7 @@ class KeptColors {
  private:
   struct Node {
     bool kept = false;
+    std::size_t held_bytes = 0;  ///< that count against the limit: the most that was kept here
     OwnColors colors;
   };
   std::int64_t limit_bytes_;
@@ -62,6 +64,7 @@ struct CollectedColors {
   Totals totals;
   KeptColors kept;
   std::vector<VoxelColor> of_totals;
+  double march_cpu_seconds = 0;  ///< of the marches that made them, summed over workers
 };
 
 /// Makes the scratch hold what the nodes other than number `node_idx` say (all nodes without

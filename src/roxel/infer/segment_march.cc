@@ -49,13 +49,14 @@ Segment SegmentMarch::march(const SampleView& view, const Region& region, const 
         running = flush(view, region, sample, chunk, removed, total, steps);
         return running;
       },
-      filters_.rays ? 1 : MatchBlock::kSize);
+      filters_.rays ? 1 : StepChunk::kSize);
   return total.then(in_brick_);
 }
 
 void SegmentMarch::gather(const SampleView& view, const Region& region, const SampleTerms& terms,
                           const StepChunk& chunk) {
-  gather_voxels(scratch_.voxels(), chunk.slot, chunk.count, LaneTerms(terms), block_);
+  gather_voxels(scratch_.voxels(), chunk.slot, chunk.count, block_);
+  bring_in_sample(terms, chunk.count, block_);
   std::copy(chunk.length, chunk.length + StepChunk::kSize, block_.length);
   if (!filters_.interpolate) return;
   const LatticeFrame& frame = stack_.volume().index(chunk.lattice).frame();
@@ -94,7 +95,7 @@ bool SegmentMarch::flush(const SampleView& view, const Region& region, const Reg
   for (int i = 0; i < chunk.count; ++i) __builtin_prefetch(&scratch_[chunk.slot[i]]);
   const SampleTerms terms = sample_terms(filters_.rays ? removed.apply(sample) : sample, model_);
   gather(view, region, terms, chunk);
-  evaluate_match(model_, terms, chunk.count, block_);
+  evaluate_match(model_, chunk.count, block_);
   const int taken = fold(chunk, removed, total);
   steps.append(chunk, block_, taken, depths_);
   return taken == chunk.count;

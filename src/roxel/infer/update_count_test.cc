@@ -73,8 +73,9 @@ TEST(UpdatesPerVoxel, AreWhatTheColourPassDoes) {
   const LatticeStack stack(tunnel.volume());
   NodeScratch scratch(stack, tunnel.volume().tau);
   const PassCounts counts = march_color(stack, {view}, {}, true, RunContext(1), scratch);
-  // Cells that a ray but grazes are met by one walk and not by the other.
-  EXPECT_NEAR(counts.steps, counter.steps, 2e-3 * counter.steps);
+  EXPECT_GE(counts.steps, counter.steps);
+  EXPECT_LE(counts.steps, counter.steps + counter.slivers);
+  EXPECT_LT(counter.slivers, 0.03 * counter.steps);
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ class UpdateCounter {
           [&](const VoxelStep& step, const VoxelPlace&) {
             plain[step.slot] += 1;
             weighted[step.slot] += step.weight;
-            ++steps;
+            ++(step.length > kSliver ? steps : slivers);
             return true;
           });
     if (range.end >= view_.plan.range.end) return;
@@ -75,12 +75,15 @@ class UpdateCounter {
       if (inside(view_, region.child(c))) count(region.child(c), std::max(range.begin, range.end));
   }
 
+  /// Shorter chords are where a ray but touches a voxel, voxel lengths: one walk finds them, another does not.
+  static constexpr float kSliver = 1e-6f;
+
   LatticeStack stack_;
   const SampleView& view_;
 
  public:
   std::vector<double> plain, weighted;
-  std::int64_t steps = 0;
+  std::int64_t steps = 0, slivers = 0;
 };
 
 }  // namespace roxel::fixture

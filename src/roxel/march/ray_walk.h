@@ -310,9 +310,13 @@ class LatticeStack {
   /// Bricks of all lattices are numbered in one range.
   std::uint32_t first_brick(int lattice) const { return first_brick_[lattice]; }
   std::uint32_t brick_count() const { return brick_count_; }
-  const Brick& brick(std::uint32_t number) const {
+  int lattice_of(std::uint32_t number) const {
     int lattice = static_cast<int>(boxes_.size()) - 1;
     while (number < first_brick_[lattice]) --lattice;
+    return lattice;
+  }
+  const Brick& brick(std::uint32_t number) const {
+    const int lattice = lattice_of(number);
     return volume_->index(lattice).bricks()[number - first_brick_[lattice]];
   }
 

@@ -1,5 +1,6 @@
 #include "roxel/volume/volume.h"
 
+#include <bit>
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -63,7 +64,15 @@ BrickIndex::BrickIndex(const Topology& topology, std::uint32_t first_slot)
     brick.first_slot = first_slot_ + slot_count_;
     brick.local.fill(kNoVoxel);
     std::uint16_t local = 0;
-    for (auto v = mask._Find_first(); v < mask.size(); v = mask._Find_next(v)) brick.local[v] = local++;
+    BrickBits& bits = bits_.emplace_back();
+    bits.word.fill(0);
+    for (auto v = mask._Find_first(); v < mask.size(); v = mask._Find_next(v)) {
+      brick.local[v] = local++;
+      bits.word[v / 32] |= std::uint32_t{1} << v % 32;
+    }
+    bits.before[0] = 0;
+    for (std::size_t w = 1; w < bits.word.size(); ++w)
+      bits.before[w] = static_cast<std::uint16_t>(bits.before[w - 1] + std::popcount(bits.word[w - 1]));
     brick.count = local;
     slot_count_ += local;
   });

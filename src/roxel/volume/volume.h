@@ -97,6 +97,13 @@ struct Brick {
   std::array<std::uint16_t, kBrickVoxels> local;
 };
 
+/// The same brick in little memory: voxel v exists where bit v % 32 of word[v / 32] is set, and its slot is that
+/// of the brick plus before[v / 32] plus the bits set below it.
+struct alignas(64) BrickBits {
+  std::array<std::uint32_t, kBrickVoxels / 32> word;
+  std::array<std::uint16_t, kBrickVoxels / 32> before;
+};
+
 /// A topology compiled for the march: two array reads from a voxel to its slot.
 class BrickIndex {
  public:
@@ -108,6 +115,8 @@ class BrickIndex {
   std::uint32_t first_slot() const { return first_slot_; }
   std::uint32_t slot_count() const { return slot_count_; }
   const std::vector<Brick>& bricks() const { return bricks_; }
+  /// Of each of bricks().
+  const std::vector<BrickBits>& bits() const { return bits_; }
   /// Index into bricks(), or -1; (bx, by, bz) must be inside the frame.
   std::int32_t brick_at(int bx, int by, int bz) const {
     return table_[bx + static_cast<std::size_t>(frame_.size_in_bricks.x()) *
@@ -123,6 +132,7 @@ class BrickIndex {
   std::uint32_t slot_count_ = 0;
   std::vector<std::int32_t> table_;
   std::vector<Brick> bricks_;
+  std::vector<BrickBits> bits_;
 };
 
 /// The frames of a volume: the box's lattice and `surround_count` lattices around it. The box is `bounds`

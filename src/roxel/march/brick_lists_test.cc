@@ -1,0 +1,99 @@
+#include "roxel/march/brick_lists.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "roxel/march/packet_walk.h"
+#include "roxel/march/walk_fixture.h"
+
+namespace roxel {
+namespace {
+
+PinholeCamera camera_somewhere(double distance, std::mt19937& random) {
+  std::normal_distribution<double> normal(0, 1);
+  PinholeCamera camera;
+  const Eigen::Quaterniond turn =
+      Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
+  camera.pose.rotation = turn.toRotationMatrix();
+  const Eigen::Vector3d aside(0.3 * normal(random), 0.3 * normal(random), 0);
+  camera.pose.centre =
+      -distance * camera.pose.rotation.row(2).transpose() + camera.pose.rotation.transpose() * aside;
+  camera.intrinsics = {53, 37, 40, 42, 25, 19, 0.7};
+  return camera;
+}
+
+/// Samples of 4 pixels to depth 2, of 2 to depth 4, of 1 behind.
+SamplePlan plan_to(double far) {
+  SamplePlan plan;
+  plan.range = {0.01, far};
+  plan.root_level = 2;
+  plan.finest_level = 0;
+  plan.serves_until_ = {0, 4, 2};
+  return plan;
+}
+
+class BrickListsTest : public testing::TestWithParam<double> {};
+
+// From outside, from in between the lattices and from within: packets that go by the lists meet what single
+// rays meet, in the same order, at the depths of each level.
+TEST_P(BrickListsTest, PacketsMeetAllThatRaysMeet) {
+  std::mt19937 random(3);
+  std::size_t met = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    const Volume volume = nested(0.4, 2, random);
+    const LatticeStack stack(volume);
+    const PinholeCamera camera = camera_somewhere(GetParam(), random);
+    const SamplePlan plan = plan_to(30);
+    const BrickLists lists(stack, camera, plan);
+    PacketWalk walk(stack);
+    PacketSteps steps;
+    double begin = plan.range.begin;
+    for (int level = plan.root_level; level >= plan.finest_level; --level) {
+      const Stretch range{begin, std::min(plan.range.end, plan.serves_until(level))};
+      begin = range.end;
+      for (int y = 0; y << level < camera.intrinsics.height; ++y)
+        for (int x = 0; x << level < camera.intrinsics.width; ++x) {
+          const double side = std::ldexp(1, level);
+          const Ray ray = camera.ray(std::min((x + 0.5) * side, 53.0), std::min((y + 0.5) * side, 37.0));
+          walk.begin(ray.origin, range, lists.at(level, x, y));
+          walk.add(0, ray.direction);
+          std::vector<VoxelStep> found;
+          while (walk.next(steps))
+            for (int i = 0; i < steps.count; ++i)
+              if (steps.length[i] >= kSliver)
+                found.push_back({steps.slot[i], steps.length[i], steps.weight[i],
+                                 std::numeric_limits<float>::quiet_NaN()});
+          ASSERT_TRUE(same_as_twin(volume, ray, range, found));
+          met += found.size();
+        }
+    }
+  }
+  EXPECT_GT(met, 10000u);
+}
+
+INSTANTIATE_TEST_SUITE_P(OutsideBetweenAndInside, BrickListsTest, testing::Values(9.0, 3.0, 1.4, 0.3));
+
+TEST(BrickLists, LeaveOutWhatIsNotSeen) {
+  Topology topology(LatticeFrame{{0, 0, 0}, 1, {4, 1, 1}});
+  topology.insert({1, 1, 1});
+  topology.insert({25, 1, 1});
+  const Volume volume({topology});
+  PinholeCamera camera;
+  camera.pose.centre = {4, 4, -20};
+  camera.intrinsics = {200, 200, 200, 200, 100, 100, 0};
+  SamplePlan plan;
+  plan.range = {1, 100};
+  plan.serves_until_ = {0};
+  const BrickLists lists(LatticeStack(volume), camera, plan);
+  ASSERT_EQ(lists.at(0, 100, 100).size(), 1u);
+  EXPECT_EQ(lists.at(0, 100, 100)[0], 0u);
+  EXPECT_TRUE(lists.at(0, 0, 0).empty());
+  EXPECT_TRUE(lists.at(0, 199, 10).empty());
+  EXPECT_EQ(lists.at(0, 97, 101).data(), lists.at(0, 100, 103).data());
+  plan.range.end = 19;
+  EXPECT_TRUE(BrickLists(LatticeStack(volume), camera, plan).at(0, 100, 100).empty());
+}
+
+}  // namespace
+}  // namespace roxel
