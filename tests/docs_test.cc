@@ -19,7 +19,7 @@ const char* const kIntroduction =
     "FILE.json`) the\n"
     "keys are the names without dashes; a switch such as `--no-adaptive` is `\"adaptive\": false`. Unknown "
     "keys are\n"
-    "errors.\n"
+    "errors. Options of input, depth, mesh and of the run itself are on [commands.md](commands.md#options).\n"
     "\n";
 
 TEST(Docs, OptionsPageIsUpToDate) {

@@ -1,5 +1,6 @@
 /// roxel merge: joins the volumes of several runs.
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -65,16 +66,56 @@ MergeOptions merge_options(const FinishedRun& run) {
   return options;
 }
 
+/// Hashes of the photographs that a run was made from, itself or merged from others.
+std::set<std::string> photographs_of(const FinishedRun& run) {
+  std::set<std::string> hashes;
+  const auto list = [](const nlohmann::json& json, const char* key) {
+    return json.value(key, nlohmann::json::array());
+  };
+  for (const nlohmann::json& view : list(run.summary, "views"))
+    if (view.contains("hash") && view["hash"].is_string()) hashes.insert(view["hash"].get<std::string>());
+  for (const nlohmann::json& source : list(run.summary, "merged_from"))
+    for (const nlohmann::json& hash : list(source, "photographs")) hashes.insert(hash.get<std::string>());
+  return hashes;
+}
+
+/// Whether the voxels of two runs can lie at the same places.
+bool boxes_overlap(const FinishedRun& a, const FinishedRun& b) {
+  const LatticeFrame &first = a.file.volume.index(0).frame(), &second = b.file.volume.index(0).frame();
+  const Eigen::AlignedBox3d common = first.box().intersection(second.box());
+  return (common.sizes().array() > 0.5 * first.voxel_size).all();
+}
+
+/// Photographs that two runs of overlapping boxes have in common: their evidence is summed twice.
+std::vector<std::string> repeated_evidence(const std::vector<FinishedRun>& runs) {
+  std::vector<std::string> warnings;
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    for (std::size_t j = i + 1; j < runs.size(); ++j) {
+      if (!boxes_overlap(runs[i], runs[j])) continue;
+      const std::set<std::string> first = photographs_of(runs[i]), second = photographs_of(runs[j]);
+      const auto common = std::count_if(first.begin(), first.end(),
+                                        [&](const std::string& hash) { return second.contains(hash); });
+      if (common > 0)
+        warnings.push_back(runs[i].path.string() + " and " + runs[j].path.string() + ": " +
+                           std::to_string(common) +
+                           " photographs are in both, and count twice where the boxes overlap; expected "
+                           "boxes side by side, or other photographs");
+    }
+  return warnings;
+}
+
 /// The first run's summary, less what was true of that run alone.
 nlohmann::ordered_json merged_summary(const Invocation& invocation, const std::vector<FinishedRun>& runs,
-                                      const Volume& volume) {
+                                      const std::vector<std::string>& warnings, const Volume& volume) {
   nlohmann::ordered_json summary = runs.front().summary;
   nlohmann::ordered_json sources = nlohmann::ordered_json::array();
   for (const FinishedRun& run : runs)
-    sources.push_back(
-        {{"run", run.path.string()}, {"dataset", run.summary.value("dataset", nlohmann::json())}});
-  for (const char* key : {"levels", "passes", "stages", "notes", "warnings", "views"})
+    sources.push_back({{"run", run.path.string()},
+                       {"dataset", run.summary.value("dataset", nlohmann::json())},
+                       {"photographs", photographs_of(run)}});
+  for (const char* key : {"levels", "passes", "stages", "notes", "views"})
     summary[key] = nlohmann::ordered_json::array();
+  summary["warnings"] = warnings;
   summary["command"] = invocation.line;
   summary["termination"] = "merged";
   summary["reprojection_rms_percent"] = nullptr;
@@ -124,6 +165,8 @@ int run_merge(const Invocation& invocation, const MergeCommandOptions& options) 
   for (const FinishedRun& run : runs) sources.folders.push_back(run.path);
   protect_sources(invocation.output, sources);
   const OutputFolder folder(invocation.output);
+  const std::vector<std::string> warnings = repeated_evidence(runs);
+  for (const std::string& warning : warnings) warn(options.common, warning);
   std::vector<const Volume*> volumes;
   for (const FinishedRun& run : runs) volumes.push_back(&run.file.volume);
   const Volume merged = merge(volumes, merge_options(runs.front()), session.context().thread_count());
@@ -136,7 +179,7 @@ int run_merge(const Invocation& invocation, const MergeCommandOptions& options) 
       static_cast<float>(options.opacity_threshold.value_or(used_number(runs.front(), "opacity-threshold"))),
       used_number(runs.front(), "confidence-threshold"));
   session.context().throw_if_cancelled();
-  const std::string json = json_text(merged_summary(invocation, runs, merged));
+  const std::string json = json_text(merged_summary(invocation, runs, warnings, merged));
   write_text_atomically(results.path() / "summary.json", json + "\n");
   session.context().throw_if_cancelled();
   results.publish([&] { remove_results(folder.path()); });

@@ -64,6 +64,15 @@ OptionTable<InputOptions> make_input_table(bool masks) {
       .help("Use only capture nodes A to B - 1, counted from 0; either may be left out")
       .placeholder("A:B")
       .unset("all");
+  table.add("node-tolerance", &InputOptions::node_tolerance)
+      .help(
+          "Images whose centres are at most this far apart, or joined by others that are, were taken from "
+          "one "
+          "place (node), where the data set does not say; 0: only from the same point")
+      .unit("world units")
+      .at_least(0)
+      .unset("a twentieth of the step between views spread evenly over the cameras' extent")
+      .source("docs/datasets.md");
   if (masks)
     table.add("masks", &InputOptions::masks)
         .help("Folder of masks; auto: those of the data set; none: no masks")
@@ -96,6 +105,7 @@ Input read_input(const std::string& path, const InputOptions& options, const Ses
   if (options.format != "auto") read.format = options.format;
   read.images = options.images.value_or("");
   read.nodes = options.nodes.value_or("");
+  read.node_tolerance = options.node_tolerance;
   read.masks = options.masks;
   Input input;
   if (options.response != "auto") input.response = parse_response(options.response, "--response");

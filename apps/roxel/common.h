@@ -34,6 +34,7 @@ struct InputOptions {
   std::string format = "auto";
   std::optional<std::string> images;
   std::optional<std::string> nodes;
+  std::optional<double> node_tolerance;
   std::string masks = "auto";
   std::string response = "auto";
 };

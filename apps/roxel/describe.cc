@@ -10,6 +10,7 @@
 #include "roxel/dataset/box_visibility.h"
 #include "roxel/depth/scaled_view.h"
 #include "roxel/solve/estimate.h"
+#include "roxel/solve/idle_options.h"
 
 namespace roxel::cli {
 namespace {
@@ -18,6 +19,15 @@ using nlohmann::ordered_json;
 
 constexpr int kSurveyedViews = 16;
 constexpr double kGibibyte = 1024.0 * 1024.0 * 1024.0;
+
+/// With the light that may be found once the run begins, where its options leave that to the photographs.
+Scene with_light(const ReconstructOptions& options, Scene scene) {
+  if (options.illumination == IlluminationChoice::kNone || options.illumination == IlluminationChoice::kGain)
+    return scene;
+  scene.light.from = LightSource::kSky;
+  scene.light.local_matching = options.matching != Matching::kCanonical;
+  return scene;
+}
 
 /// The scene as the reconstruction will see it; background, exposure and surround from a few images only, so
 /// that large data sets are described quickly.
@@ -28,6 +38,7 @@ Scene preview_scene(const Input& input, const ReconstructOptions& options, RunCo
   const int kept = std::min(count, kSurveyedViews);
   std::vector<View> views;
   for (int i = 0; i < kept; ++i) views.push_back(few.views[static_cast<std::size_t>(i) * count / kept]);
+  for (View& view : views) view.node_id = view.node_idx;
   few.views = std::move(views);
   few.nodes.clear();
   assign_nodes(few);
@@ -44,6 +55,8 @@ Scene preview_scene(const Input& input, const ReconstructOptions& options, RunCo
   scene.surround_count = surveyed.surround_count;
   for (const std::string& note : surveyed.notes)
     if (!note.starts_with("bounds:")) scene.notes.push_back(note);
+  for (std::string& idle : idle_options(options, with_light(options, surveyed)))
+    scene.warnings.push_back(std::move(idle));
   return scene;
 }
 
@@ -109,91 +122,137 @@ double surface_seconds(const Dataset& dataset, double voxel_px, const DepthStage
   return each * std::reduce(pixels.begin(), pixels.end()) / threads;
 }
 
+/// All that is said, before it is put into words.
+struct Facts {
+  const Dataset& dataset;
+  const ReconstructOptions& options;
+  const DepthStageOptions& depth;
+  int threads;
+  Scene scene;
+  Eigen::Vector3i voxels;
+  BoxVisibility seen;
+  CostEstimate cost;
+  double depth_seconds;
+  std::vector<std::string> notes, warnings;
+};
+
+Facts find_facts(const Input& input, const ReconstructOptions& options, const DepthStageOptions& depth,
+                 RunContext& context) {
+  const Dataset& dataset = input.dataset;
+  const int threads = context.thread_count();
+  Scene scene = preview_scene(input, options, context);
+  const Eigen::Vector3i voxels = nested_frames(scene.bounds.box, scene.voxel_size, 0)[0].size_in_voxels();
+  const BoxVisibility seen = box_visibility(dataset, scene.bounds, scene.voxel_size);
+  CostEstimate cost = estimate_cost(dataset, scene, options, threads);
+  const double depth_seconds = surface_seconds(dataset, seen.median_pixels_per_voxel, depth, threads);
+  std::vector<std::string> notes = dataset.notes, warnings = dataset.warnings;
+  notes.insert(notes.end(), scene.notes.begin(), scene.notes.end());
+  warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
+  if (!cost.memory.fits) warnings.push_back("memory: " + memory_shortage(dataset, scene, options, threads));
+  return {dataset, options,         depth,         threads,          std::move(scene),   voxels,
+          seen,    std::move(cost), depth_seconds, std::move(notes), std::move(warnings)};
+}
+
+std::string photographs_text(const Dataset& dataset) {
+  const int masks = count_masks(dataset);
+  std::string text = dataset.path + "\n";
+  text += row("format", dataset.format);
+  text += row("images", formatted("%zu, %s pixels", dataset.views.size(), image_sizes(dataset).c_str()));
+  text += row("masks", masks == 0 ? "none" : formatted("%d", masks));
+  text += row("cameras", formatted("%d", count_lenses(dataset)));
+  text += row("nodes", formatted("%zu", dataset.nodes.size()));
+  if (!dataset.points.empty()) text += row("points", formatted("%zu", dataset.points.size()));
+  return text;
+}
+
+std::string box_rows(const Facts& facts) {
+  const Scene& scene = facts.scene;
+  const Eigen::Vector3i& voxels = facts.voxels;
+  const BoxVisibility& seen = facts.seen;
+  std::string text = row("bounds", box_text(scene.bounds.box));
+  text += row("", scene.bounds.how);
+  text += row("far", formatted("%.6g", scene.bounds.far));
+  text += row("voxels", formatted("%d x %d x %d of %.6g, %d levels", voxels.x(), voxels.y(), voxels.z(),
+                                  scene.voxel_size, facts.options.levels));
+  text += row("surround", scene.surround_count > 0 ? formatted("%d lattices", scene.surround_count) : "none");
+  text += row("voxel in px", formatted("%.2f (median of %d images that see the box; %.2f to %.2f)",
+                                       seen.median_pixels_per_voxel, seen.views, seen.min_pixels_per_voxel,
+                                       seen.max_pixels_per_voxel));
+  text += row("seen twice", formatted("%.0f %% of the box", 100 * seen.share_seen_twice));
+  return text;
+}
+
+std::string cost_rows(const Facts& facts) {
+  std::string text = row("memory", memory_row(facts.cost.memory));
+  text +=
+      row("time", "about " + duration_text(facts.cost.seconds) + formatted(" on %d threads", facts.threads));
+  text += row("", "and up to " + duration_text(facts.depth_seconds) + " for " +
+                      (facts.depth.refine ? "refined " : "") + "depth and the surface");
+  return text;
+}
+
+std::string remarks(const Facts& facts) {
+  std::string text;
+  for (const std::string& note : facts.notes)
+    if (!note.starts_with("bounds:")) text += row("note", note);
+  for (const std::string& warning : facts.warnings) text += row("WARNING", warning);
+  return text;
+}
+
+ordered_json estimate_json(const Facts& facts) {
+  ordered_json levels = ordered_json::array();
+  for (const LevelEstimate& level : facts.cost.levels)
+    levels.push_back({{"voxel_size", level.voxel_size},
+                      {"voxels", level.voxels},
+                      {"steps_per_pass", level.steps_per_pass}});
+  const MemoryPlan& memory = facts.cost.memory;
+  return {{"memory_bytes", memory.peak_bytes},
+          {"memory_limit_bytes", memory.limit_bytes},
+          {"memory_fits", memory.fits},
+          {"seconds", facts.cost.seconds},
+          {"depth_seconds", facts.depth_seconds},
+          {"threads", facts.threads},
+          {"levels", levels}};
+}
+
+ordered_json facts_json(const Facts& facts) {
+  const Dataset& dataset = facts.dataset;
+  const Scene& scene = facts.scene;
+  const BoxVisibility& seen = facts.seen;
+  const Eigen::Vector3d low = scene.bounds.box.min(), high = scene.bounds.box.max();
+  return {{"dataset", dataset.path},
+          {"format", dataset.format},
+          {"images", dataset.views.size()},
+          {"image_sizes", image_sizes(dataset)},
+          {"masks", count_masks(dataset)},
+          {"cameras", count_lenses(dataset)},
+          {"nodes", dataset.nodes.size()},
+          {"points", dataset.points.size()},
+          {"bounds", {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()}},
+          {"bounds_from", scene.bounds.how},
+          {"far", scene.bounds.far},
+          {"voxel_size", scene.voxel_size},
+          {"voxels", {facts.voxels.x(), facts.voxels.y(), facts.voxels.z()}},
+          {"levels", facts.options.levels},
+          {"surround_lattices", scene.surround_count},
+          {"pixels_per_voxel",
+           {{"min", seen.min_pixels_per_voxel},
+            {"median", seen.median_pixels_per_voxel},
+            {"max", seen.max_pixels_per_voxel}}},
+          {"views_of_box", seen.views},
+          {"share_seen_twice", seen.share_seen_twice},
+          {"estimate", estimate_json(facts)},
+          {"notes", facts.notes},
+          {"warnings", facts.warnings}};
+}
+
 }  // namespace
 
 Description describe(const Input& input, const ReconstructOptions& options, const DepthStageOptions& depth,
                      RunContext& context) {
-  const Dataset& dataset = input.dataset;
-  const Scene scene = preview_scene(input, options, context);
-  const Eigen::Vector3i voxels = nested_frames(scene.bounds.box, scene.voxel_size, 0)[0].size_in_voxels();
-  const BoxVisibility seen = box_visibility(dataset, scene.bounds, scene.voxel_size);
-  const CostEstimate cost = estimate_cost(dataset, scene, options, context.thread_count());
-  const double depth_seconds =
-      surface_seconds(dataset, seen.median_pixels_per_voxel, depth, context.thread_count());
-  std::vector<std::string> warnings = dataset.warnings;
-  warnings.insert(warnings.end(), scene.warnings.begin(), scene.warnings.end());
-  if (!cost.memory.fits)
-    warnings.push_back("memory: " + memory_shortage(dataset, scene, options, context.thread_count()));
-  std::vector<std::string> notes = dataset.notes;
-  notes.insert(notes.end(), scene.notes.begin(), scene.notes.end());
-  const int masks = count_masks(dataset), lenses = count_lenses(dataset);
-
-  Description out;
-  out.text = dataset.path + "\n";
-  out.text += row("format", dataset.format);
-  out.text += row("images", formatted("%zu, %s pixels", dataset.views.size(), image_sizes(dataset).c_str()));
-  out.text += row("masks", masks == 0 ? "none" : formatted("%d", masks));
-  out.text += row("cameras", formatted("%d", lenses));
-  out.text += row("nodes", formatted("%zu", dataset.nodes.size()));
-  if (!dataset.points.empty()) out.text += row("points", formatted("%zu", dataset.points.size()));
-  out.text += row("bounds", box_text(scene.bounds.box));
-  out.text += row("", scene.bounds.how);
-  out.text += row("far", formatted("%.6g", scene.bounds.far));
-  out.text += row("voxels", formatted("%d x %d x %d of %.6g, %d levels", voxels.x(), voxels.y(), voxels.z(),
-                                      scene.voxel_size, options.levels));
-  out.text +=
-      row("surround", scene.surround_count > 0 ? formatted("%d lattices", scene.surround_count) : "none");
-  out.text += row("voxel in px", formatted("%.2f (median of %d images that see the box; %.2f to %.2f)",
-                                           seen.median_pixels_per_voxel, seen.views,
-                                           seen.min_pixels_per_voxel, seen.max_pixels_per_voxel));
-  out.text += row("seen twice", formatted("%.0f %% of the box", 100 * seen.share_seen_twice));
-  out.text += row("memory", memory_row(cost.memory));
-  out.text += row(
-      "time", "about " + duration_text(cost.seconds) + formatted(" on %d threads", context.thread_count()));
-  out.text += row("", "and up to " + duration_text(depth_seconds) + " for " +
-                          (depth.refine ? "refined " : "") + "depth and the surface");
-  for (const std::string& note : notes)
-    if (!note.starts_with("bounds:")) out.text += row("note", note);
-  for (const std::string& warning : warnings) out.text += row("WARNING", warning);
-
-  const Eigen::Vector3d low = scene.bounds.box.min(), high = scene.bounds.box.max();
-  ordered_json levels = ordered_json::array();
-  for (const LevelEstimate& level : cost.levels)
-    levels.push_back({{"voxel_size", level.voxel_size},
-                      {"voxels", level.voxels},
-                      {"steps_per_pass", level.steps_per_pass}});
-  out.json = {{"dataset", dataset.path},
-              {"format", dataset.format},
-              {"images", dataset.views.size()},
-              {"image_sizes", image_sizes(dataset)},
-              {"masks", masks},
-              {"cameras", lenses},
-              {"nodes", dataset.nodes.size()},
-              {"points", dataset.points.size()},
-              {"bounds", {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()}},
-              {"bounds_from", scene.bounds.how},
-              {"far", scene.bounds.far},
-              {"voxel_size", scene.voxel_size},
-              {"voxels", {voxels.x(), voxels.y(), voxels.z()}},
-              {"levels", options.levels},
-              {"surround_lattices", scene.surround_count},
-              {"pixels_per_voxel",
-               {{"min", seen.min_pixels_per_voxel},
-                {"median", seen.median_pixels_per_voxel},
-                {"max", seen.max_pixels_per_voxel}}},
-              {"views_of_box", seen.views},
-              {"share_seen_twice", seen.share_seen_twice},
-              {"estimate",
-               {{"memory_bytes", cost.memory.peak_bytes},
-                {"memory_limit_bytes", cost.memory.limit_bytes},
-                {"memory_fits", cost.memory.fits},
-                {"seconds", cost.seconds},
-                {"depth_seconds", depth_seconds},
-                {"threads", context.thread_count()},
-                {"levels", levels}}},
-              {"notes", notes},
-              {"warnings", warnings}};
-  return out;
+  const Facts facts = find_facts(input, options, depth, context);
+  return {photographs_text(input.dataset) + box_rows(facts) + cost_rows(facts) + remarks(facts),
+          facts_json(facts)};
 }
 
 }  // namespace roxel::cli

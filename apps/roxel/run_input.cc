@@ -58,6 +58,8 @@ InputOptions input_options_of(const FinishedRun& run) {
   text("format", options.format);
   text("images", options.images);
   text("nodes", options.nodes);
+  if (const nlohmann::json& value = run.option("node-tolerance"); value.is_number())
+    options.node_tolerance = value.get<double>();
   text("masks", options.masks);
   text("response", options.response);
   return options;

@@ -11,7 +11,7 @@ import pathlib
 import tempfile
 import unittest
 
-import cli_test
+import program
 
 
 def data_set(name):
@@ -20,7 +20,7 @@ def data_set(name):
     return next((folder / name for folder in folders if (folder / name).is_dir()), None)
 
 
-class AccuracyCase(cli_test.Case):
+class AccuracyCase(program.Case):
     """A run of one data set, measured against the truth."""
 
     name = None  # of the data set
@@ -37,7 +37,7 @@ class AccuracyCase(cli_test.Case):
         out = cls.folder / "run"
         for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", *cls.options, "--no-render", "--no-report", "--quiet"],
                         ["eval", out, "--truth", data, "-o", cls.folder / "metrics", "--quiet"]):
-            done = cli_test.run(*command, timeout=1000)
+            done = program.run(*command, timeout=1000)
             assert done.returncode == 0, done.stderr
         cls.metrics = json.loads((cls.folder / "metrics/metrics.json").read_text())
 
@@ -94,4 +94,4 @@ class Courtyard(AccuracyCase):
 
 
 if __name__ == "__main__":
-    cli_test.main()
+    program.main()

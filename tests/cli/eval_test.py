@@ -7,7 +7,6 @@
 import html
 import json
 import os
-import pathlib
 import re
 import shutil
 import struct
@@ -15,8 +14,8 @@ import subprocess
 import sys
 import unittest
 
-import cli_test
-from cli_test import TINY, digest, files_below
+import program
+from program import TINY, digest, files_below
 
 # A box of two units a side about the middle of the demo's world: corners, and faces as squares.
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-0.7, 1.3)]
@@ -50,14 +49,14 @@ def exr(planes, width=64, height=48):
     return head + struct.pack(f"<{height}q", *(first + y * (8 + line) for y in range(height))) + b"".join(lines)
 
 
-class EvalCase(cli_test.Case):
+class EvalCase(program.Case):
     """A run with its data set, and a truth that has a mesh alone."""
 
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         cls.run_folder = cls.folder / "run"
-        done = cli_test.run("reconstruct", cls.data, "-o", cls.run_folder, *TINY, "--passes", "4", "--bounds=-1.5,-1.5,-1.2,1.5,1.5,1.8")
+        done = program.run("reconstruct", cls.data, "-o", cls.run_folder, *TINY, "--passes", "4", "--bounds=-1.5,-1.5,-1.2,1.5,1.5,1.8")
         assert done.returncode == 0, done.stderr
         cls.mesh = cls.folder / "mesh"
         cls.mesh.mkdir()
@@ -309,7 +308,7 @@ class Options(EvalCase):
     def test_every_option_has_a_case_and_is_in_the_docs(self):
         named = set(re.findall(r"^  --(?:no-)?([a-z-]+)", self.succeed("eval", "--help").stdout, re.M))
         self.assertEqual(named - self.ELSEWHERE, set(self.CHANGES))
-        docs = (cli_test.SOURCE / "docs/evaluation.md").read_text()
+        docs = (program.SOURCE / "docs/evaluation.md").read_text()
         for option in set(self.CHANGES) | {"section"}:
             self.assertIn(f"--{option}", docs)
 
@@ -365,11 +364,11 @@ class BadTruth(EvalCase):
     def test_a_full_disc_leaves_older_measures(self):
         out = self.folder / "older"
         self.succeed("eval", self.run_folder, "-o", out, "--quiet")
-        before = cli_test.digests(out)
+        before = program.digests(out)
         most_bytes = (out / "report.html").stat().st_size // 2
-        done = cli_test.run_on_a_full_disc("eval", self.run_folder, "--truth", self.mesh, "-o", out, most_bytes=most_bytes)
+        done = program.run_on_a_full_disc("eval", self.run_folder, "--truth", self.mesh, "-o", out, most_bytes=most_bytes)
         self.assertEqual(done.returncode, 1, done.stderr)
-        self.assertEqual(cli_test.digests(out), before)
+        self.assertEqual(program.digests(out), before)
         self.assertFalse((out / ".partial").exists())
 
     def test_truth_of_another_size_is_refused(self):
@@ -463,8 +462,7 @@ def main():
         sys.exit(__doc__)
     if not CHROMIUM:
         print("SKIPPED: no Chromium is installed, so nobody looks at the report's page", file=sys.stderr)
-    cli_test.ROXEL = os.path.abspath(sys.argv.pop(1))
-    cli_test.SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+    program.ROXEL = os.path.abspath(sys.argv.pop(1))
     unittest.main(argv=[sys.argv[0], *sys.argv[1:]])
 
 

@@ -11,8 +11,9 @@ import shutil
 import struct
 import unittest
 
-import cli_test
-from cli_test import Case, digest, files_below, run
+import program
+from options_test import MESH
+from program import Case, digest, files_below, run
 
 MESH_FILES = ["mesh.glb", "mesh.mtl", "mesh.obj", "mesh.ply", "mesh.png", "mesh_turntable.jpg", "mesh_views.png"]
 SMALL = ["--resolution", "40", "--levels", "2", "--passes", "4", "--no-render", "--no-report"]
@@ -121,7 +122,7 @@ class Mesh(Case):
         self.assertEqual(summary["passes"], self.summary["passes"])
 
     def test_every_option_changes_something(self):
-        self.assertEqual(set(CHANGES) | {"mesh", "mesh-pictures"}, cli_test.MESH)
+        self.assertEqual(set(CHANGES) | {"mesh", "mesh-pictures"}, MESH)
         known = {}
         for option, (base, change, name) in CHANGES.items():
             with self.subTest(option):
@@ -146,7 +147,7 @@ class Mesh(Case):
         largest = max((self.run_folder / name).stat().st_size for name in MESH_FILES)
         for most_bytes in (20000, largest - 10):
             with self.subTest(most_bytes):
-                full = cli_test.run_on_a_full_disc("mesh", self.run_folder, "--quiet", most_bytes=most_bytes)
+                full = program.run_on_a_full_disc("mesh", self.run_folder, "--quiet", most_bytes=most_bytes)
                 self.assertEqual(full.returncode, 1, full.stderr)
                 self.assertRegex(full.stderr, "mesh.*(cannot write|writing failed)")
         self.assertEqual({f: digest(self.run_folder / f) for f in files_below(self.run_folder)}, before)
@@ -241,4 +242,4 @@ class Mesh(Case):
 
 
 if __name__ == "__main__":
-    cli_test.main()
+    program.main()

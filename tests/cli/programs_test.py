@@ -7,10 +7,11 @@ package gltf-validator, found by NODE_PATH).
 
 import json
 import shutil
+import struct
 import subprocess
 import unittest
 
-import cli_test
+import program
 from mesh_test import SMALL, bounds_of
 
 VALIDATE = """
@@ -23,13 +24,13 @@ def has_validator():
     return shutil.which("node") and subprocess.run(["node", "-e", "require('gltf-validator')"], capture_output=True).returncode == 0
 
 
-class ProgramCase(cli_test.Case):
+class ProgramCase(program.Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         cls.photographs, cls.run_folder = cls.folder / "photographs", cls.folder / "run"
         cls.synth(cls.photographs, 16, "128x96")
-        done = cli_test.run("reconstruct", cls.photographs, "-o", cls.run_folder, *SMALL, "--export", "colmap", "--quiet")
+        done = program.run("reconstruct", cls.photographs, "-o", cls.run_folder, *SMALL, "--export", "colmap", "--quiet")
         assert done.returncode == 0, done.stderr
 
 
@@ -49,7 +50,7 @@ class Colmap(ProgramCase):
         _, _, box = bounds_of(self.run_folder / "mesh.ply")
         size = len(rows) // count
         for axis, (low, high) in enumerate(box):
-            middle = sorted(cli_test.struct.unpack_from("<f", rows, size * i + 4 * axis)[0] for i in range(count))
+            middle = sorted(struct.unpack_from("<f", rows, size * i + 4 * axis)[0] for i in range(count))
             span = middle[int(0.98 * count)] - middle[int(0.02 * count)]
             self.assertTrue(0.5 * (high - low) < span < 2 * (high - low), (axis, span, low, high))
 
@@ -64,4 +65,4 @@ class GltfValidator(ProgramCase):
 
 
 if __name__ == "__main__":
-    cli_test.main()
+    program.main()

@@ -12,8 +12,8 @@ import signal
 import subprocess
 import time
 
-import cli_test
-from cli_test import Case, digests, files_below, main, numbers, run, start_until
+import program
+from program import Case, digests, files_below, main, numbers, run, start_until
 
 # Passes of some hundredths of a second each, and a checkpoint after each.
 OFTEN = ["--resolution", "48", "--levels", "2", "--passes", "8", "--all-passes", "--no-mesh", "--no-refine",
@@ -64,7 +64,7 @@ class Resume(Case):
         went_on = 0
         for _ in range(20):
             went_on += (out / "checkpoint/latest.roxel").exists()
-            job = subprocess.Popen([cli_test.ROXEL, "reconstruct", str(self.data), "-o", str(out), *OFTEN, "--resume"],
+            job = subprocess.Popen([program.ROXEL, "reconstruct", str(self.data), "-o", str(out), *OFTEN, "--resume"],
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
             # Counted in what it says: how long a pass takes depends on what else the machine does.
             for _ in range(chance.randrange(12)):
@@ -180,7 +180,7 @@ class FullDisc(Case):
         inside = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
         if subprocess.run([*inside, f"mount -t tmpfs -o size=1m none {disc}"], capture_output=True).returncode != 0:
             self.skipTest("mounting in a namespace is not allowed here")
-        roxel = f"{cli_test.ROXEL} reconstruct {self.data} -o {out} {' '.join(OFTEN)} --resume"
+        roxel = f"{program.ROXEL} reconstruct {self.data} -o {out} {' '.join(OFTEN)} --resume"
         whole = self.folder / "whole"
         self.succeed("reconstruct", self.data, "-o", whole, *OFTEN, "--quiet")
         size = 64 * 1024  # KiB: all of a run fits

@@ -7,12 +7,11 @@
 import json
 import math
 import os
-import pathlib
 import sys
 import unittest
 
-import cli_test
-from cli_test import digest, files_below, start_until
+import program
+from program import digest, files_below, start_until
 
 WIDTH, HEIGHT = 128, 64
 
@@ -64,7 +63,7 @@ CHANGES = {
 ELSEWHERE = {"format", "images", "nodes", "up", "sky-masks", "pictures", "threads", "quiet", "verbose", "json", "config", "help"}
 
 
-class SkyCase(cli_test.Case):
+class SkyCase(program.Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -134,7 +133,7 @@ class SkyOptions(SkyCase):
 
     def test_every_option_is_in_help_and_in_the_docs(self):
         text = self.succeed("sky", "--help").stdout
-        docs = (cli_test.SOURCE / "docs/commands.md").read_text() + (cli_test.SOURCE / "docs/options.md").read_text()
+        docs = (program.SOURCE / "docs/commands.md").read_text() + (program.SOURCE / "docs/options.md").read_text()
         for option in set(CHANGES) | ELSEWHERE:
             self.assertRegex(text, rf"--(no-)?{option}\b")
             self.assertRegex(docs, rf"--(no-)?{option}\b")
@@ -232,8 +231,7 @@ class SkyMeasures(SkyCase):
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
-    cli_test.ROXEL = os.path.abspath(sys.argv.pop(1))
-    cli_test.SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+    program.ROXEL = os.path.abspath(sys.argv.pop(1))
     unittest.main(argv=[sys.argv[0], *sys.argv[1:]])
 
 
@@ -244,9 +242,9 @@ SMALL = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "non
 def set_up_street(cls):
     super(cls, cls).setUpClass()
     cls.street, cls.skies = cls.folder / "street", cls.folder / "street-skies"
-    made = cli_test.run("synth", "street", "-o", cls.street, "--images", "48", "--size", "48x38", "--samples", "1", "--quiet")
+    made = program.run("synth", "street", "-o", cls.street, "--images", "48", "--size", "48x38", "--samples", "1", "--quiet")
     assert made.returncode == 0, made.stderr
-    made = cli_test.run("sky", cls.street, "-o", cls.skies, "--no-pictures", "--quiet")
+    made = program.run("sky", cls.street, "-o", cls.skies, "--no-pictures", "--quiet")
     assert made.returncode == 0, made.stderr
 
 

@@ -24,13 +24,6 @@ inline __attribute__((always_inline)) void store(const Vector& from, Element* to
   *reinterpret_cast<Anywhere*>(to) = from;
 }
 
-/// Whether any lane of a mask is set.
-inline __attribute__((always_inline)) bool any(const Ints& mask) {
-  std::int64_t pairs[kLanes / 2];
-  store(mask, pairs);
-  return (pairs[0] | pairs[1] | pairs[2] | pairs[3]) != 0;
-}
-
 /// rows[i][j] <-> rows[j][i].
 inline __attribute__((always_inline)) void transpose(Floats rows[kLanes]) {
   Floats a[kLanes], b[kLanes];
@@ -67,26 +60,6 @@ inline __attribute__((always_inline)) void transpose(const FourFloats rows[kLane
   columns[1] = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
   columns[2] = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
   columns[3] = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
-}
-
-/// to[lane] = (columns[0][lane], .. columns[3][lane]).
-inline __attribute__((always_inline)) void transpose(const Floats columns[4], float to[kLanes][4]) {
-  const Floats a = __builtin_shufflevector(columns[0], columns[1], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Floats b = __builtin_shufflevector(columns[0], columns[1], 2, 10, 3, 11, 6, 14, 7, 15);
-  const Floats c = __builtin_shufflevector(columns[2], columns[3], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Floats d = __builtin_shufflevector(columns[2], columns[3], 2, 10, 3, 11, 6, 14, 7, 15);
-  const Floats of_0_4 = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
-  const Floats of_1_5 = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
-  const Floats of_2_6 = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
-  const Floats of_3_7 = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
-  const auto put = [&](const Floats& pair, int lane) __attribute__((always_inline)) {
-    store(__builtin_shufflevector(pair, pair, 0, 1, 2, 3), to[lane]);
-    store(__builtin_shufflevector(pair, pair, 4, 5, 6, 7), to[lane + 4]);
-  };
-  put(of_0_4, 0);
-  put(of_1_5, 1);
-  put(of_2_6, 2);
-  put(of_3_7, 3);
 }
 
 }  // namespace roxel

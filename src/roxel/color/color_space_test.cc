@@ -285,7 +285,7 @@ TEST(GamutDiameter, IsNotExceededByAnyPairAndIsReached) {
   }
 }
 
-TEST(DefaultNoise, IsFourInLuvAndWorthTheSameEverywhere) {
+TEST(DefaultNoise, IsThreeInLuvAndWorthTheSameEverywhere) {
   EXPECT_DOUBLE_EQ(default_noise(ColorSpace::kLuv), 3);
   const double p = unknown_color_likelihood(ColorSpace::kLuv, 3);
   EXPECT_GT(p, 0.0002);

@@ -61,9 +61,14 @@ struct Photograph {
 /// Throws InvalidInput when the file is missing, broken or of another size than the camera. Thread safe.
 using PhotographLoader = std::function<Photograph(const View&)>;
 
+/// Below this distance, in world units, two centres count as one place: a twentieth of the step between views
+/// that are spread evenly as far as these typically are apart. A few that strayed far off do not change it
+/// much.
+double default_node_tolerance(const std::vector<View>& views);
+
 /// Groups views into nodes: by node_id where given, otherwise by optical centres within `tolerance` (world
-/// units; chains of close centres join); negative tolerance = 1e-6 of the largest distance between centres.
-/// Fills nodes (given ids first, ascending; then in the order of the views) and node_idx.
-void assign_nodes(Dataset& dataset, double tolerance = -1);
+/// units; chains of close centres join), by default default_node_tolerance(). Fills nodes (given ids first,
+/// ascending; then in the order of the views) and node_idx.
+void assign_nodes(Dataset& dataset, std::optional<double> tolerance = std::nullopt);
 
 }  // namespace roxel

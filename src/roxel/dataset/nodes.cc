@@ -7,16 +7,35 @@
 namespace roxel {
 namespace {
 
-constexpr double kDefaultRelativeTolerance = 1e-6;
+// With n views spread evenly along a line as long as they typically are apart, neighbours stand a step of
+// spread / n apart, and any even layout in two or three dimensions has them farther apart. A twentieth of
+// that step: neighbours on a straight path are forty times as far apart, on an orbit seventy, however many
+// they are, while the centres that structure-from-motion finds for one panorama (its noise is taken as 1e-4
+// of the scene's depth) join in sets of up to some five hundred views. Too small is the safer side: a chain
+// of short steps would make a whole path one witness.
+constexpr double kShareOfStep = 0.05;
+// Of a view's distances to the others: one place may hold up to three quarters of all views, and up to a
+// quarter of them may have strayed, before the step is theirs.
+constexpr double kTypicalRank = 0.75;
+constexpr std::size_t kMostRanked = 512;
 
-double largest_centre_distance(const std::vector<View>& views) {
-  double largest = 0;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    for (std::size_t j = i + 1; j < views.size(); ++j) {
-      largest = std::max(largest, (views[i].camera.pose.centre - views[j].camera.pose.centre).squaredNorm());
-    }
+double ranked(std::vector<double> values, double rank) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// How far views typically are apart: the median over views of a high rank of their distances to the others.
+double typical_distance(const std::vector<View>& views) {
+  const std::size_t stride = (views.size() - 1) / kMostRanked + 1;
+  std::vector<double> of_views, distances;
+  for (std::size_t i = 0; i < views.size(); i += stride) {
+    distances.clear();
+    for (std::size_t j = 0; j < views.size(); ++j)
+      if (j != i) distances.push_back((views[i].camera.pose.centre - views[j].camera.pose.centre).norm());
+    of_views.push_back(ranked(distances, kTypicalRank));
   }
-  return std::sqrt(largest);
+  return ranked(std::move(of_views), 0.5);
 }
 
 /// Disjoint sets of indices; the smallest index of a set is its root.
@@ -62,9 +81,14 @@ Node make_node(const std::vector<View>& views, const std::vector<int>& view_idxs
 
 }  // namespace
 
-void assign_nodes(Dataset& dataset, double tolerance) {
+double default_node_tolerance(const std::vector<View>& views) {
+  if (views.size() < 2) return 0;
+  return kShareOfStep * typical_distance(views) / static_cast<double>(views.size());
+}
+
+void assign_nodes(Dataset& dataset, std::optional<double> given_tolerance) {
   std::vector<View>& views = dataset.views;
-  if (tolerance < 0) tolerance = kDefaultRelativeTolerance * largest_centre_distance(views);
+  const double tolerance = given_tolerance ? *given_tolerance : default_node_tolerance(views);
 
   std::map<int, std::vector<int>> by_id;
   std::vector<int> without_id;

@@ -52,6 +52,54 @@ TEST(Nodes, GivenIdsComeFirstInOrder) {
   EXPECT_THAT(dataset.nodes[2].view_idxs, ElementsAre(2));
 }
 
+std::vector<Eigen::Vector3d> orbit(int count) {
+  std::vector<Eigen::Vector3d> places;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2 * M_PI * i / count;
+    places.emplace_back(std::cos(angle), std::sin(angle), 0.3);
+  }
+  return places;
+}
+
+std::size_t count_nodes(const std::vector<Eigen::Vector3d>& places) {
+  Dataset dataset = at_places(places);
+  assign_nodes(dataset);
+  return dataset.nodes.size();
+}
+
+TEST(Nodes, OneFarCameraJoinsNoOthers) {
+  for (const int count : {3, 12, 100}) {
+    std::vector<Eigen::Vector3d> places = orbit(count);
+    places.emplace_back(1e9, 0, 0);
+    EXPECT_EQ(count_nodes(places), places.size()) << count;
+  }
+}
+
+TEST(Nodes, AQuarterOfStrayCamerasJoinsNoOthers) {
+  std::vector<Eigen::Vector3d> places = orbit(40);
+  for (int i = 0; i < 9; ++i) places.emplace_back(1e7, 1e8 * i, 0);
+  EXPECT_EQ(count_nodes(places), places.size());
+}
+
+TEST(Nodes, NeighboursOfLongOrbitsAndPathsStayApart) {
+  EXPECT_EQ(count_nodes(orbit(3000)), 3000u);
+  std::vector<Eigen::Vector3d> path;
+  for (int i = 0; i < 3000; ++i) path.emplace_back(0.1 * i, 0, 0);
+  EXPECT_EQ(count_nodes(path), 3000u);
+}
+
+/// Panoramas whose centres are known as well as structure-from-motion knows them, one with most of all views.
+TEST(Nodes, CentresOfAPanoramaJoinThoughTheyAreNoisy) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0, 1e-4);
+  std::vector<Eigen::Vector3d> places;
+  for (const int count : {60, 12, 12, 12})
+    for (int i = 0; i < count; ++i)
+      places.emplace_back(3.0 * count + noise(random), (i < count ? 0.1 : 0) + noise(random), noise(random));
+  for (std::size_t i = 0; i < places.size(); ++i) places[i].y() += i < 60 ? 0 : 6.0 * ((i - 60) / 12);
+  EXPECT_EQ(count_nodes(places), 4u);
+}
+
 TEST(Nodes, AllAtOnePlaceAreOneNode) {
   Dataset dataset = at_places({{1, 2, 3}, {1, 2, 3}});
   assign_nodes(dataset);

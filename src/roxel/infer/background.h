@@ -16,7 +16,7 @@ struct Background {
   BackgroundKind kind = BackgroundKind::kUnknown;
   float mean[3] = {0, 0, 0};  ///< kKnown: matching space
   float cov[6] = {0, 0, 0, 0, 0, 0};
-  float unknown_likelihood = 0.001f;  ///< kUnknown: (2 pi)^{3/2} |S_min|^{1/2} / gamut volume
+  float unknown_likelihood = 0.000320427527f;  ///< kUnknown: (2 pi)^{3/2} |S_min|^{1/2} / gamut volume
 };
 
 /// Likelihood p_bg of the sample if nothing in the volume stopped its ray.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace roxel {
@@ -16,6 +17,12 @@ Background background_of(BackgroundKind kind) {
   background.cov[0] = 4;
   background.unknown_likelihood = 0.002f;
   return background;
+}
+
+MatchModel model_of_noise_4() {
+  MatchModel model;
+  std::fill_n(model.noise_variance, 3, 16.0f);
+  return model;
 }
 
 /// sqrt(|S_min| / |S|) exp(-d^2 / (2 S)) along the first axis: noise 16, sample 9, background 4.
@@ -38,9 +45,10 @@ TEST(Background, UnknownIsAnyColourAlike) {
 
 TEST(Background, KnownIsAgreementWithItsColour) {
   const Background known = background_of(BackgroundKind::kKnown);
+  const MatchModel model = model_of_noise_4();
   for (const float l : {20.0f, 27.0f, 35.0f}) {
-    EXPECT_NEAR(background_likelihood(known, {}, sample_of(l, 1)), known_agreement(l - 20) + 1e-7, 1e-6);
-    EXPECT_NEAR(known_background_share(known, {}, sample_of(l, 1)), known_agreement(l - 20), 1e-6);
+    EXPECT_NEAR(background_likelihood(known, model, sample_of(l, 1)), known_agreement(l - 20) + 1e-7, 1e-6);
+    EXPECT_NEAR(known_background_share(known, model, sample_of(l, 1)), known_agreement(l - 20), 1e-6);
   }
 }
 

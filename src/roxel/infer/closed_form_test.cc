@@ -268,6 +268,7 @@ TEST(RunPass, PredictionComparesWithTheOtherNode) {
     PassOptions options;
     options.predictive = predictive;
     options.everywhere = true;
+    options.opacity.model.uninformative = 0.001f;
     options.opacity.background.kind = BackgroundKind::kNone;
     const std::vector<SampleNode> nodes{node({4.5, 4.5, -20}, red), node({-20, 4.5, 4.5}, second)};
     return run_pass(nodes, options, RunContext(1), nullptr, volume).opacity.log_likelihood;
@@ -287,6 +288,7 @@ TEST(RunPass, OneNodeAloneHasNoEvidenceToBeComparedWith) {
   volume.tau[0] = 0.5f;
   PassOptions options;
   options.everywhere = true;
+  options.opacity.model.uninformative = 0.001f;
   options.opacity.background.kind = BackgroundKind::kNone;
   const PassReport report = run_pass({{along_x({50, 0, 0}, 1)}}, options, RunContext(1), nullptr, volume);
   EXPECT_NEAR(report.opacity.log_likelihood, std::log((1 - std::exp(-0.5)) * (0.001 + 1e-7)), 1e-4);

@@ -55,6 +55,15 @@ void ColorLanes::set(int ray, const RegionStats& sample, float whole, float reac
   transmittance[ray] = reaches;
 }
 
+float color_weight(const SampleView& view, const Region& region, const RegionStats& sample,
+                   const MarchOptions& options) {
+  const Background& background = options.background;
+  const float known = background.kind == BackgroundKind::kKnown
+                          ? known_background_share(background, options.model, sample)
+                          : 0.0f;
+  return observation_weight(view, region, sample) * sample.foreground * (1 - known);
+}
+
 void ColorPackets::tile(const ListedView& listed, const Tile& tile) {
   samples_.clear();
   march_tile(*this, listed, tile);
@@ -67,21 +76,12 @@ void ColorPackets::add(const SampleView& view, const Region& region, int parent)
   samples_.push_back({region, parent < 0 ? 1.0f : samples_[parent].transmittance});
 }
 
-float ColorPackets::sample_weight(const SampleView& view, const Region& region,
-                                  const RegionStats& sample) const {
-  const Background& background = options_.background;
-  const float known = background.kind == BackgroundKind::kKnown
-                          ? known_background_share(background, options_.model, sample)
-                          : 0.0f;
-  return observation_weight(view, region, sample) * sample.foreground * (1 - known);
-}
-
 void ColorPackets::march(const SampleView& view, const SamplePacket& packet) {
   ColorLanes lanes;
   for (int ray = 0; ray < packet.count; ++ray) {
     const Sample& sample = samples_[packet.sample[ray]];
     const RegionStats stats = view.pyramid->at(sample.region.level, sample.region.x, sample.region.y);
-    lanes.set(ray, stats, sample_weight(view, sample.region, stats), sample.transmittance);
+    lanes.set(ray, stats, color_weight(view, sample.region, stats, options_), sample.transmittance);
   }
   counts.rays += packet.count;
   while (walk_.next(steps_)) {

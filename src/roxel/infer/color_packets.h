@@ -19,12 +19,19 @@ struct alignas(64) ColorLanes {
   void set(int ray, const RegionStats& sample, float weight, float transmittance);
 };
 
+/// Transmittance below which what lies behind is not coloured. The roxels rule gives hidden voxels opacity as
+/// well, so that their colours count for more.
+constexpr float spent_transmittance(UpdateRule rule) { return rule == UpdateRule::kRoxels ? 1e-5f : 1e-3f; }
+/// What a region's sample counts for colour: its observation weight, as far as it shows no known background.
+float color_weight(const SampleView& view, const Region& region, const RegionStats& sample,
+                   const MarchOptions& options);
+
 class ColorPackets {
  public:
   ColorPackets(const LatticeStack& stack, const MarchOptions& options, bool everywhere, NodeScratch& scratch)
       : options_(options),
         everywhere_(everywhere),
-        spent_(options.rule == UpdateRule::kRoxels ? kSpentRoxels : kSpent),
+        spent_(spent_transmittance(options.rule)),
         scratch_(scratch),
         walk_(stack) {}
 
@@ -34,10 +41,6 @@ class ColorPackets {
   PassCounts counts;
 
  private:
-  /// Transmittance below which what lies behind is not coloured. The roxels rule gives hidden voxels opacity
-  /// as well, so that their colours count for more.
-  static constexpr float kSpent = 1e-3f, kSpentRoxels = 1e-5f;
-
   struct Sample {
     Region region;
     float transmittance;  ///< as far as its stretch, then behind it
@@ -57,7 +60,6 @@ class ColorPackets {
   void level_done(std::size_t) {}
   bool goes_on(float transmittance) const { return everywhere_ || transmittance >= spent_; }
   void deposit(ColorLanes& lanes);
-  float sample_weight(const SampleView& view, const Region& region, const RegionStats& sample) const;
 
   const MarchOptions& options_;
   bool everywhere_;

@@ -162,6 +162,73 @@ TEST_F(TwoVoxelRay, FilterBackgroundNeedsAKnownBackground) {
   EXPECT_EQ(march(image_of(colors_[0]))[0].likelihood, plain[0].likelihood);
 }
 
+/// Means that a colour march gives to the two voxels of the ray, or NaN where it gives nothing.
+class TwoColoredVoxels : public TwoVoxelRay {
+ protected:
+  std::array<Eigen::Vector3d, 2> coloured(const Image& image, bool everywhere = false) {
+    for (int i = 0; i < 2; ++i) {
+      volume_.color_weight[i] = 1;
+      for (int c = 0; c < 3; ++c) volume_.color_mean[i][c] = static_cast<float>(colors_[i][c]);
+      volume_.color_cov[i] = {9, 9, 9, 0, 0, 0};
+    }
+    const SampleView view = view_of(camera_, image, plan_of({1, 100}, 0));
+    const LatticeStack stack(volume_);
+    NodeScratch scratch(stack, volume_.tau);
+    MarchOptions options;
+    options.model = model_;
+    options.background = background_;
+    options.filters = filters_;
+    march_color(stack, {view}, options, everywhere, RunContext(1), scratch);
+    std::array<Eigen::Vector3d, 2> means;
+    for (int i = 0; i < 2; ++i)
+      for (int c = 0; c < 3; ++c) means[i][c] = scratch[i].mean[c] / scratch[i].evidence;
+    return means;
+  }
+};
+
+TEST_F(TwoColoredVoxels, FilterRaysColoursVoxelsBehindWithWhatGoesOn) {
+  const Eigen::Vector3d seen = kOpacity[0] * colors_[0] + (1 - kOpacity[0]) * colors_[1];
+  EXPECT_LT((coloured(image_of(seen))[1] - seen).norm(), 1e-3);
+  filters_.rays = true;
+  const auto means = coloured(image_of(seen));
+  EXPECT_LT((means[0] - seen).norm(), 1e-3);
+  EXPECT_LT((means[1] - colors_[1]).norm(), 1e-3);
+  // In the very first pass nothing is known that could be removed.
+  EXPECT_LT((coloured(image_of(seen), true)[1] - seen).norm(), 1e-3);
+}
+
+TEST_F(TwoColoredVoxels, FilterBackgroundColoursWithoutItsShare) {
+  background_.kind = BackgroundKind::kKnown;
+  const Eigen::Vector3d black(5, 0, 0);
+  for (int c = 0; c < 3; ++c) background_.mean[c] = static_cast<float>(black[c]);
+  background_.cov[0] = background_.cov[1] = background_.cov[2] = 2;
+  const double share = (1 - kOpacity[0]) * (1 - kOpacity[1]);
+  const Eigen::Vector3d seen = share * black + (1 - share) * colors_[1];
+  EXPECT_LT((coloured(image_of(seen))[1] - seen).norm(), 1e-3);
+  filters_.background = true;
+  for (const Eigen::Vector3d& mean : coloured(image_of(seen))) EXPECT_LT((mean - colors_[1]).norm(), 1e-3);
+}
+
+TEST_F(TwoColoredVoxels, InterpolateColoursWithTheColourAtTheVoxelsCentre) {
+  camera_ = camera_at({-20, 4.7, 4.4}, {4.5, 4.6, 4.45}, 3, 20);
+  Image ramp(3, 3, 3);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 3; ++x) {
+      ramp.pixel(x, y)[0] = 50 + 12.0f * x;
+      ramp.pixel(x, y)[1] = -10 + 9.0f * y;
+    }
+  const auto plain = coloured(ramp);
+  filters_.interpolate = true;
+  const auto interpolated = coloured(ramp);
+  for (int i = 0; i < 2; ++i) {
+    // All rays that meet the voxel give it the one colour of its centre: the ramp is linear.
+    const Eigen::Vector3d at = camera_.project({i == 0 ? 2.5 : 5.5, 4.5, 4.5});
+    const Eigen::Vector3d there(50 + 12 * (at.x() - 0.5), -10 + 9 * (at.y() - 0.5), 0);
+    EXPECT_LT((interpolated[i] - there).norm(), 1e-3);
+    EXPECT_GT((plain[i] - there).norm(), 0.5);
+  }
+}
+
 // The centre of a voxel that a pixel's ray passes aside of projects beside the pixel's centre: the colour
 // there counts.
 TEST_F(TwoVoxelRay, InterpolateComparesTheColourAtTheVoxelsCentre) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "roxel/infer/color_packets.h"
+#include "roxel/infer/filtered_color.h"
 #include "roxel/infer/opacity_packets.h"
 
 namespace roxel {
@@ -179,6 +180,12 @@ class OpacityMarch {
 
 PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
                        bool everywhere, const RunContext& context, NodeScratch& scratch) {
+  if (FilteredColorMarch::serves(options)) {
+    FilteredColorMarch march(stack, options, everywhere, scratch);
+    for_each_root(stack, node, context,
+                  [&](const ViewInSight& in_sight, const Region& region) { march.root(in_sight, region); });
+    return march.counts;
+  }
   ColorPackets packets(stack, options, everywhere, scratch);
   for_each_tile<ListedView>(stack, node, context,
                             [&](const ListedView& view, const Tile& tile) { packets.tile(view, tile); });

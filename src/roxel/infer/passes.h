@@ -32,7 +32,7 @@ struct MarchOptions {
 
 /// Colour: adds each sample to the voxels along its ray with weight responsibility x ray weight x observation
 /// weight, where the responsibility is a_s T_s from the global opacities, or 1 everywhere when `everywhere`.
-/// Samples of a known background colour nothing.
+/// Samples of a known background colour nothing. Filters change the sample that each voxel is given.
 PassCounts march_color(const LatticeStack& stack, const SampleNode& node, const MarchOptions& options,
                        bool everywhere, const RunContext& context, NodeScratch& scratch);
 

@@ -20,18 +20,28 @@ RegionStats RemovedColor::apply(const RegionStats& sample) const {
   return rest;
 }
 
-RegionStats SegmentMarch::background_removed(const SampleView& view, const Ray& ray,
-                                             const RegionStats& sample) {
+RegionStats without_background(const LatticeStack& stack, const SampleView& view, const Ray& ray,
+                               const RegionStats& sample, const Background& background,
+                               const SampleFilters& filters, NodeScratch& scratch) {
   float transmittance = 1;
-  stack_.walk(
-      ray, view.plan.range, [&](std::uint32_t brick) { scratch_.enter(brick); },
+  stack.walk(
+      ray, view.plan.range, [&](std::uint32_t brick) { scratch.enter(brick); },
       [&](const VoxelStep& step, const VoxelPlace&) {
-        transmittance *= 1 - one_minus_exp(scratch_[step.slot].tau * step.length);
+        transmittance *= 1 - one_minus_exp(scratch[step.slot].tau * step.length);
         return true;
       });
   RemovedColor removed;
-  removed.remove(transmittance, background_.mean, background_.cov, filters_.limit);
+  removed.remove(transmittance, background.mean, background.cov, filters.limit);
   return removed.apply(sample);
+}
+
+bool mean_at_voxel(const SampleView& view, const Region& region, const LatticeFrame& frame,
+                   const Eigen::Vector3i& voxel, float mean[3]) {
+  const Eigen::Vector3d at = view.camera.project(frame.voxel_centre(voxel));
+  float there[3];
+  if (!view.pyramid->bilinear(region.level, at.x(), at.y(), there)) return false;
+  std::copy(there, there + 3, mean);
+  return true;
 }
 
 Segment SegmentMarch::march(const SampleView& view, const Region& region, const RegionStats& sample_seen,
@@ -39,7 +49,7 @@ Segment SegmentMarch::march(const SampleView& view, const Region& region, const 
                             EvaluatedSteps& steps) {
   RegionStats sample = sample_seen;
   if (filters_.background && background_.kind == BackgroundKind::kKnown)
-    sample = background_removed(view, ray, sample);
+    sample = without_background(stack_, view, ray, sample, background_, filters_, scratch_);
   Segment total;
   in_brick_ = {};
   bool running = true;
@@ -61,9 +71,8 @@ void SegmentMarch::gather(const SampleView& view, const Region& region, const Sa
   if (!filters_.interpolate) return;
   const LatticeFrame& frame = stack_.volume().index(chunk.lattice).frame();
   for (int i = 0; i < chunk.count; ++i) {
-    const Eigen::Vector3d at = view.camera.project(frame.voxel_centre(chunk.voxel(i)));
     float mean[3];
-    if (!view.pyramid->bilinear(region.level, at.x(), at.y(), mean)) continue;
+    if (!mean_at_voxel(view, region, frame, chunk.voxel(i), mean)) continue;
     for (int c = 0; c < 3; ++c) block_.diff[c][i] += terms.mean[c] - mean[c];
   }
 }

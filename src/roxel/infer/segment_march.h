@@ -75,6 +75,15 @@ struct RemovedColor {
   RegionStats apply(const RegionStats& sample) const;
 };
 
+/// The sample less what a known background explains of it, if its ray gets that far (--filter-background).
+RegionStats without_background(const LatticeStack& stack, const SampleView& view, const Ray& ray,
+                               const RegionStats& sample, const Background& background,
+                               const SampleFilters& filters, NodeScratch& scratch);
+/// The photograph's colour where a voxel's centre projects, for samples of the region's size
+/// (--interpolate). Leaves `mean` as it is, and returns false, where nothing there is valid.
+bool mean_at_voxel(const SampleView& view, const Region& region, const LatticeFrame& frame,
+                   const Eigen::Vector3i& voxel, float mean[3]);
+
 class SegmentMarch {
  public:
   SegmentMarch(const LatticeStack& stack, NodeScratch& scratch, const MatchModel& model,
@@ -99,7 +108,6 @@ class SegmentMarch {
              RemovedColor& removed, Segment& total, EvaluatedSteps& steps);
   int fold(const StepChunk& chunk, RemovedColor& removed, Segment& total);
   void gather(const SampleView& view, const Region& region, const SampleTerms& terms, const StepChunk& chunk);
-  RegionStats background_removed(const SampleView& view, const Ray& ray, const RegionStats& sample);
 
   const LatticeStack& stack_;
   NodeScratch& scratch_;

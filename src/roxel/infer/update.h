@@ -10,7 +10,7 @@ namespace roxel {
 /// Gamma prior on optical depth with its mode at a field that knows that surfaces are sheets.
 struct PriorOptions {
   double opacity = 0.02;         ///< alpha_0, in (0, 1)
-  double strength = 5;           ///< beta >= 0, in observations
+  double strength = 1;           ///< beta >= 0, in observations
   double spatial_lambda = 0.99;  ///< lambda in [0, 1]: weight of the neighbours' opacity in the prior's mode
 };
 

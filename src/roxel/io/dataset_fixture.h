@@ -64,13 +64,13 @@ struct TextbookCamera {
   }
 };
 
-/// Cameras around the origin with different intrinsics.
-inline std::vector<TextbookCamera> textbook_cameras(int count = 5) {
+/// Cameras around the origin with different intrinsics. `skew`: 0 for formats that have none.
+inline std::vector<TextbookCamera> textbook_cameras(int count = 5, double skew = 0) {
   std::vector<TextbookCamera> cameras;
   for (int i = 0; i < count; ++i) {
     TextbookCamera camera;
     camera.name = std::string("view") + static_cast<char>('a' + i) + ".png";
-    camera.k << 40 + i, 0, 15.7 + 0.3 * i, 0, 41 + 0.5 * i, 12.4 - 0.2 * i, 0, 0, 1;
+    camera.k << 40 + i, skew, 15.7 + 0.3 * i, 0, 41 + 0.5 * i, 12.4 - 0.2 * i, 0, 0, 1;
     camera.r = (Eigen::AngleAxisd(0.3 + 0.9 * i, Eigen::Vector3d(0.2, 1, -0.3 * i).normalized()) *
                 Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX()))
                    .toRotationMatrix();
@@ -191,6 +191,7 @@ inline void write_transforms_json(const fs::path& set, const std::vector<Textboo
     m.topRightCorner<3, 1>() = -c.r.transpose() * c.t;
     json += (i ? ",\n{" : "\n{") + extra + "\"file_path\": \"images/" + c.name + "\"";
     json += ", \"w\": " + std::to_string(c.width) + ", \"h\": " + std::to_string(c.height);
+    if (c.k(0, 1) != 0) json += ", \"skew\": " + digits(c.k(0, 1));
     json += ", \"fl_x\": " + digits(c.k(0, 0)) + ", \"fl_y\": " + digits(c.k(1, 1));
     json +=
         ", \"cx\": " + digits(c.k(0, 2)) + ", \"cy\": " + digits(c.k(1, 2)) + ",\n\"transform_matrix\": [";

@@ -277,7 +277,7 @@ Dataset read_dataset(const fs::path& path, const ReadOptions& options) {
   for (View& view : dataset.views) complete_camera(view);
   find_masks(path, options.masks, dataset);
   check_mask_sizes(dataset);
-  keep_nodes(options.nodes, options.node_tolerance, dataset);
+  keep_nodes(options.nodes, options.node_tolerance.value_or(default_node_tolerance(dataset.views)), dataset);
   return dataset;
 }
 

@@ -3,6 +3,7 @@
 /// Strecha *.camera and KRT text files. Pixels are not read here, only image headers (docs/datasets.md).
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "roxel/dataset/dataset.h"
@@ -21,8 +22,9 @@ struct ReadOptions {
   /// "auto": mask paths of the data set, or files masks/NAME.png, masks/NAME.SUFFIX.png or mask/... beside
   /// the images; "none"; or a folder that holds such files.
   std::string masks = "auto";
-  /// assign_nodes' tolerance, world units; negative = its default.
-  double node_tolerance = -1;
+  /// Images whose centres are at most this far apart (world units, chains join) are of one node, where the
+  /// data set says none; none = default_node_tolerance() of the images that are kept.
+  std::optional<double> node_tolerance;
 };
 
 /// `path` is the data set's folder, or a transforms file. Nodes are assigned, image headers are compared with

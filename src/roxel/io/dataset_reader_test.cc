@@ -44,13 +44,16 @@ struct FormatCase {
   const char* name;
   const char* format;
   std::function<void(const fs::path&, const std::vector<TextbookCamera>&)> write;
+  double skew = 0;  ///< where the format has a place for it
 };
+
+constexpr double kSkew = 0.6;
 
 class EveryFormat : public ::testing::TestWithParam<FormatCase> {};
 
 TEST_P(EveryFormat, ReprojectsKnownPoints) {
   const TempFolder set;
-  const std::vector<TextbookCamera> cameras = textbook_cameras();
+  const std::vector<TextbookCamera> cameras = textbook_cameras(5, GetParam().skew);
   GetParam().write(set.path(), cameras);
   const Dataset dataset = read_dataset(set.path());
   EXPECT_EQ(dataset.format, GetParam().format);
@@ -94,11 +97,12 @@ INSTANTIATE_TEST_SUITE_P(DatasetReader, EveryFormat,
                          ::testing::Values(FormatCase{"ColmapText", "colmap", write_colmap_case},
                                            FormatCase{"ColmapTextInFolder", "colmap", write_colmap_flat_case},
                                            FormatCase{"ColmapBinary", "colmap", write_colmap_binary},
-                                           FormatCase{"Transforms", "transforms", write_transforms_case},
-                                           FormatCase{"Middlebury", "middlebury", write_middlebury},
-                                           FormatCase{"Strecha", "strecha", write_strecha},
-                                           FormatCase{"KrtTxt", "krt", write_krt_txt},
-                                           FormatCase{"KrtKrt", "krt", write_krt_krt}),
+                                           FormatCase{"Transforms", "transforms", write_transforms_case,
+                                                      kSkew},
+                                           FormatCase{"Middlebury", "middlebury", write_middlebury, kSkew},
+                                           FormatCase{"Strecha", "strecha", write_strecha, kSkew},
+                                           FormatCase{"KrtTxt", "krt", write_krt_txt, kSkew},
+                                           FormatCase{"KrtKrt", "krt", write_krt_krt, kSkew}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(DatasetReader, BinaryColmapEqualsText) {
@@ -241,6 +245,36 @@ TEST(DatasetReader, KeepsMatchingImages) {
     options.images = pattern;
     EXPECT_EQ(read_dataset(set.path(), options).views.size(), 2u) << pattern;
   }
+}
+
+TEST(DatasetReader, NodeToleranceJoinsCloseImages) {
+  const TempFolder set;
+  std::vector<TextbookCamera> cameras = textbook_cameras(4);
+  cameras[1].r = cameras[0].r;
+  cameras[1].t = cameras[0].t + Eigen::Vector3d(0, 0.3, 0);
+  write_colmap_text(set.path(), cameras);
+  EXPECT_EQ(read_dataset(set.path()).nodes.size(), 4u);
+  ReadOptions options;
+  options.node_tolerance = 0.301;
+  EXPECT_EQ(read_dataset(set.path(), options).nodes.size(), 3u);
+  options.node_tolerance = 0.299;
+  EXPECT_EQ(read_dataset(set.path(), options).nodes.size(), 4u);
+}
+
+// The tolerance follows from all images: of one panorama alone nobody could tell.
+TEST(DatasetReader, ARangeOfNodesKeepsTheNodesWhole) {
+  const TempFolder set;
+  std::vector<TextbookCamera> cameras = textbook_cameras(6);
+  for (int i = 0; i < 3; ++i) {
+    cameras[i].r = cameras[0].r;
+    cameras[i].t = cameras[0].t + Eigen::Vector3d(0, 1e-4 * i, 0);
+  }
+  write_colmap_text(set.path(), cameras);
+  ReadOptions options;
+  options.nodes = "0:1";
+  const Dataset dataset = read_dataset(set.path(), options);
+  EXPECT_EQ(dataset.views.size(), 3u);
+  EXPECT_EQ(dataset.nodes.size(), 1u);
 }
 
 TEST(DatasetReader, KeepsARangeOfNodes) {

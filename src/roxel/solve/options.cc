@@ -12,25 +12,30 @@ void add_volume(OptionTable<Options>& table) {
       .help("Box to reconstruct: x0,y0,z0,x1,y1,z1, or a text file with these six numbers")
       .unit("world units")
       .or_file()
-      .unset("from the data set, its points, masks, or cameras");
+      .unset("from the data set, its points, masks, or cameras")
+      .source("docs/datasets.md, \"Which box?\"");
   table.add("near", &Options::near)
       .help("Nearest depth that is looked for")
       .unit("world units")
       .above(0)
-      .unset("from the cameras and points");
+      .unset("from the cameras and points")
+      .source("docs/datasets.md, \"Which box?\"");
   table.add("far", &Options::far)
       .help("Depth at which rays end")
       .unit("world units")
       .above(0)
-      .unset("from the cameras and points");
+      .unset("from the cameras and points")
+      .source("docs/datasets.md, \"Which box?\"");
   table.add("voxel-size", &Options::voxel_size)
       .help("Edge of the finest voxels; overrides --resolution")
       .unit("world units")
       .above(0)
-      .unset("from --resolution");
+      .unset("from --resolution")
+      .source("--resolution means the same in data sets of any unit");
   table.add("resolution", &Options::resolution)
       .help("Finest voxels along the longest side of the box")
-      .range(8, 65536);
+      .range(8, 65536)
+      .source("chosen for cost: 512 takes about four times the time and memory (docs/reconstruct.md)");
   table.add("levels", &Options::levels)
       .help("Levels of resolution, each with half the voxel size of the one before")
       .range(1, 16)
@@ -47,15 +52,19 @@ void add_volume(OptionTable<Options>& table) {
       .source("measured on plane, head and dtu-scan24");
   table.add("tolerance", &Options::tolerance)
       .help("Mean change of opacity in a pass that ends a level")
-      .range(0, 1);
-  table.add("all-passes", &Options::all_passes).help("Do all passes of every level, whatever the tolerance");
+      .range(0, 1)
+      .source("chosen, not measured: far below a change that shows");
+  table.add("all-passes", &Options::all_passes)
+      .help("Do all passes of every level, whatever the tolerance")
+      .source("for experiments of a fixed cost");
   table
       .add("surround", &Options::surround,
            {{"auto", SurroundChoice::kAuto}, {"on", SurroundChoice::kOn}, {"off", SurroundChoice::kOff}})
       .help(
           "Ever coarser voxels around the box, out to the far distance, so that every ray has a place to "
           "end; "
-          "auto: where the background is not known");
+          "auto: where the background is not known")
+      .source("docs/volume.md; docs/background.md");
   table.add("memory", &Options::memory)
       .help(
           "Keep to this much memory: samples that do not fit are made anew in each pass, refinement holds "
@@ -63,7 +72,8 @@ void add_volume(OptionTable<Options>& table) {
           "views, and a surface whose lattice does not fit is an error; results are the same")
       .unit("GiB")
       .above(0)
-      .unset("what the machine has at hand");
+      .unset("what the machine has at hand")
+      .source("docs/reconstruct.md: results are the same, only slower with less");
 }
 
 void add_sampling(OptionTable<Options>& table) {
@@ -74,13 +84,14 @@ void add_sampling(OptionTable<Options>& table) {
   table.add("samples-per-voxel", &Options::samples_per_voxel)
       .help("Samples across a voxel, along an axis")
       .range(0.25, 16)
-      .source("measured");
+      .source("chosen for cost: 2 looks at up to four times as many samples (docs/rays.md)");
   table.add("interpolate", &Options::interpolate)
-      .help("Interpolate the image at each voxel centre's projection");
+      .help("Interpolate the image at each voxel centre's projection")
+      .source("a switch of the thesis's program; not measured here, and slower: rays march one by one");
   table.add("observation-weight", &Options::observation_weight)
       .help("Observations that one image makes of a voxel in the middle of the box")
       .above(0)
-      .source("measured");
+      .source("one image, one observation; chosen when 4 and 1 were compared, figures not kept");
 }
 
 void add_color(OptionTable<Options>& table) {
@@ -100,7 +111,10 @@ void add_color(OptionTable<Options>& table) {
       .help("Standard deviation of colour that is always granted")
       .unit("units of the colour space")
       .range(1e-4, 1000)
-      .unset("3 in Luv, the same share of the gamut elsewhere");
+      .unset("3 in Luv, the same share of the gamut elsewhere")
+      .source(
+          "3: measured on head and dtu-scan24; elsewhere so that an unknown colour is worth the same "
+          "(docs/color.md)");
   table
       .add("agreement", &Options::agreement,
            {{"gaussian", Agreement::kGaussian},
@@ -112,17 +126,26 @@ void add_color(OptionTable<Options>& table) {
       .help("Scale of exponential and linear agreement")
       .unit("units of the colour space")
       .above(0)
-      .unset("2.5 times the noise (exponential), 5 times (linear)");
-  table.add("outlier", &Options::outlier).help("Floor of every likelihood").range(0, 1);
+      .unset("2.5 times the noise (exponential), 5 times (linear)")
+      .source(
+          "by formula: exp(-d^2/scale^2) is as wide as Gaussian agreement of two colours that each spread by "
+          "the noise (sqrt 6 of it); linear ends where that is 2 %");
+  table.add("outlier", &Options::outlier)
+      .help("Floor of every likelihood")
+      .range(0, 1)
+      .source("far below what an unknown colour is worth, 3e-4; only keeps logarithms finite");
   table.add("uninformative", &Options::uninformative)
       .help("Likelihood of a colour where a voxel has no evidence")
       .range(0, 1)
-      .unset("that of an unknown background");
+      .unset("that of an unknown background")
+      .source("docs/background.md: the two must be one density, or clutter hangs before the cameras");
   table.add("evidence-half", &Options::evidence_half)
       .help("Colour evidence, in nodes, at which a voxel's own colour counts half")
-      .range(0, 1000);
+      .range(0, 1000)
+      .source("chosen, not measured: a fifth of one witness (docs/passes.md)");
   table.add("predictive", &Options::predictive)
-      .help("Compare a ray with what other nodes saw, leaving its own out");
+      .help("Compare a ray with what other nodes saw, leaving its own out")
+      .source("docs/passes.md: without, clutter grows before every camera");
 }
 
 void add_light(OptionTable<Options>& table) {
@@ -160,7 +183,7 @@ void add_light(OptionTable<Options>& table) {
       .help("Standard deviation of that neighbourhood")
       .unit("degrees")
       .range(0.05, 90)
-      .source("measured");
+      .source("chosen, not measured: shading is wider, texture narrower (docs/light.md)");
 }
 
 void add_background(OptionTable<Options>& table) {
@@ -173,10 +196,12 @@ void add_background(OptionTable<Options>& table) {
             {"black", BackgroundChoice::kBlack},
             {"constant", BackgroundChoice::kConstant},
             {"mask", BackgroundChoice::kMask}})
-      .help("What a ray sees that passes every voxel");
+      .help("What a ray sees that passes every voxel")
+      .source("docs/background.md");
   table.add("background-color", &Options::background_color)
       .help("Colour of a constant background, which it implies: linear r,g,b")
-      .unset("estimated from the images' borders");
+      .unset("estimated from the images' borders")
+      .source("docs/background.md");
   table.add("filter-rays", &Options::filter_rays)
       .help("Remove what a voxel explains from the sample behind it")
       .source("[Jethwa04] appendix B, -fc");
@@ -194,7 +219,8 @@ void add_opacity(OptionTable<Options>& table) {
       .source("docs/passes.md; [DeBonet99]");
   table.add("spatial-prior", &Options::spatial_prior)
       .help("Weight of the neighbours' opacity in the prior: surfaces are sheets")
-      .range(0, 1);
+      .range(0, 1)
+      .source("docs/passes.md; raised when the thirteen planes came, figures not kept");
   table.add("prior-strength", &Options::prior_strength)
       .help("Weight of the prior")
       .unit("observations")
@@ -203,7 +229,8 @@ void add_opacity(OptionTable<Options>& table) {
   table.add("prior-opacity", &Options::prior_opacity)
       .help("Opacity of a voxel about which nothing is known")
       .above(0)
-      .below(1);
+      .below(1)
+      .source("chosen: light goes fifty such voxels far on average");
   table.add("acceleration", &Options::acceleration)
       .help(
           "Longest step of an opacity, in times the pass's own, where passes keep going the same way; 1: "
@@ -211,11 +238,12 @@ void add_opacity(OptionTable<Options>& table) {
       .range(1, 100)
       .source("docs/passes.md; measured on plane and head");
   table.add("ray-weights", &Options::ray_weights)
-      .help("Weigh opacity sums, too, by how near a ray passes to the voxel's centre");
+      .help("Weigh opacity sums, too, by how near a ray passes to the voxel's centre")
+      .source("docs/passes.md: without them no pass lowers the posterior");
   table.add("opacity-threshold", &Options::opacity_threshold)
       .help("Voxels below this opacity are dropped between levels and left out of voxels.ply")
       .range(0, 0.999)
-      .source("measured");
+      .source("twice --prior-opacity: what photographs have not raised above the prior goes");
   table.add("confidence-threshold", &Options::confidence_threshold)
       .help("Voxels below this confidence are dropped between levels and left out of voxels.ply")
       .range(0, 0.999)

@@ -12,6 +12,7 @@
 #include "roxel/solve/cube_fixture.h"
 #include "roxel/solve/estimate.h"
 #include "roxel/solve/run_stages.h"
+#include "roxel/volume/merge.h"
 
 namespace roxel {
 namespace {
@@ -216,7 +217,34 @@ TEST(Reconstruct, AccelerationIsAheadOfPlainPasses) {
   EXPECT_NEAR(likelihood(4, 16), likelihood(1, 16), 0.005);  // the same place in the end
 }
 
-// What a run leaves is an EM step: the sums that merge adds up again.
+// A pass that is asked for without options is a run's.
+TEST(PassOptions, DefaultsAreThoseOfARun) {
+  const PassOptions plain;
+  const ReconstructOptions options;
+  const PassOptions run = pass_options(lay_out(cube_dataset(6, 24), cube_loader(), options), options);
+  EXPECT_EQ(run.opacity.rule, plain.opacity.rule);
+  EXPECT_EQ(run.opacity.model.agreement, plain.opacity.model.agreement);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_FLOAT_EQ(run.opacity.model.noise_variance[c], plain.opacity.model.noise_variance[c]);
+  EXPECT_FLOAT_EQ(run.opacity.model.scale, plain.opacity.model.scale);
+  EXPECT_FLOAT_EQ(run.opacity.model.evidence_half, plain.opacity.model.evidence_half);
+  EXPECT_FLOAT_EQ(run.opacity.model.uninformative, plain.opacity.model.uninformative);
+  EXPECT_FLOAT_EQ(run.opacity.model.outlier, plain.opacity.model.outlier);
+  EXPECT_EQ(run.opacity.background.kind, plain.opacity.background.kind);
+  EXPECT_FLOAT_EQ(run.opacity.background.unknown_likelihood, plain.opacity.background.unknown_likelihood);
+  EXPECT_EQ(run.opacity.filters.rays, plain.opacity.filters.rays);
+  EXPECT_EQ(run.opacity.filters.background, plain.opacity.filters.background);
+  EXPECT_EQ(run.opacity.filters.interpolate, plain.opacity.filters.interpolate);
+  EXPECT_EQ(run.opacity.ray_weights, plain.opacity.ray_weights);
+  EXPECT_EQ(run.prior.opacity, plain.prior.opacity);
+  EXPECT_EQ(run.prior.strength, plain.prior.strength);
+  EXPECT_EQ(run.prior.spatial_lambda, plain.prior.spatial_lambda);
+  EXPECT_EQ(run.predictive, plain.predictive);
+  EXPECT_EQ(run.everywhere, plain.everywhere);
+  EXPECT_EQ(run.kept_color_bytes, plain.kept_color_bytes);
+  EXPECT_EQ(run.prior.strength, MergeOptions().prior_strength);
+}
+
 TEST(Reconstruct, ABoxThatNoRayMeetsIsAnError) {
   ReconstructOptions options = cube_options();
   options.bounds = {100, 100, 100, 101, 101, 101};
@@ -251,6 +279,7 @@ TEST(Reconstruct, SaysWhatWasSurveyedBeforeTheFirstPass) {
             "a note of the reader");
 }
 
+// What a run leaves is an EM step: the sums that merge adds up again.
 TEST(Reconstruct, TheLastPassOfALevelIsPlain) {
   const auto only_pass = [](double acceleration) {
     ReconstructOptions options = cube_options();

@@ -9,6 +9,7 @@
 #include "roxel/dataset/box_visibility.h"
 #include "roxel/solve/background_choice.h"
 #include "roxel/solve/estimate.h"
+#include "roxel/solve/idle_options.h"
 
 namespace roxel {
 
@@ -210,6 +211,7 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
   if (surround)
     scene.notes.push_back("surround: " + std::to_string(scene.surround_count) + " lattices around the box");
   share_out_memory(dataset, options, context.thread_count(), scene);
+  for (std::string& idle : idle_options(options, scene)) scene.warnings.push_back(std::move(idle));
   return scene;
 }
 

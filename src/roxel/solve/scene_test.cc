@@ -44,6 +44,14 @@ TEST(Survey, WarnsOfABoxThatNoCameraSees) {
   EXPECT_THAT(surveyed(options, cube_loader()).warnings, ::testing::Not(::testing::IsEmpty()));
 }
 
+TEST(Survey, WarnsOfOptionsThatCannotAct) {
+  ReconstructOptions options = surveyed_options();
+  options.matching_blur = 9;
+  EXPECT_THAT(surveyed(options, cube_loader()).warnings, Contains(HasSubstr("--matching-blur")));
+  options.matching = Matching::kLocal;  // chosen after the box: known to the warning all the same
+  EXPECT_THAT(surveyed(options, cube_loader()).warnings, ::testing::IsEmpty());
+}
+
 TEST(Survey, RefusesMoreLevelsThanTheFinestLatticeHasRoomFor) {
   ReconstructOptions options = surveyed_options();
   options.levels = 16;

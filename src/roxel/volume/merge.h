@@ -16,7 +16,7 @@ enum class SupportRule {
 
 struct MergeOptions {
   SupportRule rule = SupportRule::kPosterior;
-  double prior_strength = 5;  ///< beta of the passes that made the volumes, >= 0
+  double prior_strength = 1;  ///< beta of the passes that made the volumes, >= 0
   /// alpha_0 in [0, 1). Unset: the prior that is in the volumes, which their tau and support give away
   /// (it differs from voxel to voxel when it came from the neighbours); the mean where volumes differ.
   std::optional<double> prior_opacity = std::nullopt;
