@@ -68,6 +68,13 @@ class Depth(Case):
         self.assertGreater(again["depth"]["refined"]["matched_pixels"], 100)
         self.assertFalse(any(name.startswith(".") for name in files_below(out)), files_below(out))
 
+    def test_memory_changes_no_map_and_is_no_part_of_a_run(self):
+        out, _ = self.reconstruct("held", "--no-render", "--no-report")
+        known = self.maps(out)
+        self.succeed("depth", out, "--memory", "0.01", "--quiet")
+        self.assertEqual(known, self.maps(out))
+        self.expect_error(2, "--memory", "depth", out, "--memory", "0")
+
     def test_the_runs_own_light_holds_when_its_volume_is_marched_through_again(self):
         out, summary = self.reconstruct("lit", "--no-render", "--illumination", "gain", "--matching", "local")
         self.assertGreater(len({tuple(view["light"]) for view in summary["views"]}), 1)

@@ -62,7 +62,7 @@ def numbers(summary):
     kept = json.loads(json.dumps(kept))
     for record in kept["levels"] + kept["passes"]:
         for key in list(record):
-            if "seconds" in key or key == "ns_per_step":
+            if "seconds" in key or key in ("ns_per_step", "peak_memory_bytes"):
                 del record[key]
     return kept
 
