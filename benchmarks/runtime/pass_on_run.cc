@@ -3,8 +3,8 @@
 ///     pass_on_run DATASET RUN [IMAGES [THREADS [PASSES]]]
 ///
 /// RUN is the folder of a `roxel reconstruct DATASET` with bounds or masks (its volume.vdb holds the box, no
-/// surround). IMAGES, a pattern, keeps some of the photographs. Prints rays, steps and nanoseconds of processor time a
-/// step of PASSES passes, of the colour and of the opacity march.
+/// surround). IMAGES, a pattern, keeps some of the photographs. Prints rays, steps and nanoseconds of
+/// processor time a step of PASSES passes, of the colour and of the opacity march.
 
 #include <cstdio>
 #include <cstdlib>
@@ -51,8 +51,8 @@ void measure(const char* dataset_path, const char* run, const char* images, int 
                 static_cast<long long>(report.color.rays), static_cast<long long>(report.color.steps),
                 report.color_seconds,
                 1e9 * report.color_march_cpu_seconds / static_cast<double>(report.color.steps),
-                static_cast<long long>(report.opacity.rays),
-                static_cast<long long>(report.opacity.steps), report.opacity_seconds,
+                static_cast<long long>(report.opacity.rays), static_cast<long long>(report.opacity.steps),
+                report.opacity_seconds,
                 1e9 * report.opacity_march_cpu_seconds / static_cast<double>(report.opacity.steps),
                 report.opacity.log_likelihood / report.opacity.observation_weight);
   }

@@ -1,6 +1,6 @@
 #pragma once
-/// The opacity march of the posterior rule without filters, several samples at a time. A tile's samples divide
-/// level by level, so that the samples of a packet are neighbours of one size.
+/// The opacity march of the posterior rule without filters, several samples at a time. A tile's samples
+/// divide level by level, so that the samples of a packet are neighbours of one size.
 
 #include <vector>
 
@@ -26,10 +26,10 @@ class OpacityPackets {
   /// One sample of a tile; those that it divides into are samples_[first_child, end_child).
   struct Sample {
     Region region;
-    float weight;      ///< observation weight
-    Segment own = {};  ///< of its stretch
-    float behind = 0;  ///< leaves: p_bg; others: product of Z_c^{share}
-    float z = 0;       ///< of its own stretch and what is behind it
+    float weight;       ///< observation weight
+    Segment own = {};   ///< of its stretch
+    float behind = 0;   ///< leaves: p_bg; others: product of Z_c^{share}
+    float z = 0;        ///< of its own stretch and what is behind it
     float reach = 0;    ///< probability of getting as far as its stretch
     bool ends = false;  ///< nothing is behind but background
     int first_child = 0, end_child = 0;

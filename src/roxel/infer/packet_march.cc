@@ -24,8 +24,7 @@ PacketSegments PacketMarch::march(int count, const PacketTerms& samples, PacketR
     if (steps_.count == 0) continue;
     evaluate(samples, segments, record);
     for (int ray = 0; ray < count; ++ray)
-      if (segments.transmittance[ray] < SegmentMarch::kNegligible * segments.likelihood[ray])
-        walk_.stop(ray);
+      if (segments.transmittance[ray] < SegmentMarch::kNegligible * segments.likelihood[ray]) walk_.stop(ray);
   }
   return segments;
 }

@@ -146,8 +146,7 @@ void give_out(PacketRecord& record, std::size_t begin, std::size_t end, bool ray
     const auto scale = hn::TableLookupLanes(all_scale, ray);
     const auto share = hn::LoadU(d, record.share() + i), before = hn::LoadU(d, record.before() + i);
     const auto weight = hn::LoadU(d, record.weight() + i);
-    const auto reach =
-        hn::Max(hn::NegMulAdd(scale, before, hn::TableLookupLanes(all_reach, ray)), zero);
+    const auto reach = hn::Max(hn::NegMulAdd(scale, before, hn::TableLookupLanes(all_reach, ray)), zero);
     const auto r = hn::Min(hn::Mul(scale, share), reach);
     auto w = hn::TableLookupLanes(all_weight, ray);
     if (ray_weights) w = hn::Mul(w, weight);
@@ -156,8 +155,7 @@ void give_out(PacketRecord& record, std::size_t begin, std::size_t end, bool ray
     hn::Store(hn::Mul(w, r), d, sums[0]);
     hn::Store(hn::Mul(w, path), d, sums[1]);
     hn::Store(hn::Mul(reach, weight), d, sums[2]);
-    add_to_voxels(sums, record.slot() + i, static_cast<int>(std::min<std::size_t>(kRays, end - i)),
-                  voxels);
+    add_to_voxels(sums, record.slot() + i, static_cast<int>(std::min<std::size_t>(kRays, end - i)), voxels);
   }
 }
 

@@ -110,7 +110,8 @@ KeptColors::KeptColors(std::size_t node_count, std::size_t limit_bytes)
     : limit_bytes_(static_cast<std::int64_t>(limit_bytes)), left_bytes_(limit_bytes_), nodes_(node_count) {}
 
 void KeptColors::clear() {
-  // What nodes hold is theirs until they are asked again: memory that is given back is taken anew page by page.
+  // What nodes hold is theirs until they are asked again: memory that is given back is taken anew page by
+  // page.
   std::int64_t held = 0;
   for (Node& node : nodes_) {
     node.kept = false;

@@ -75,7 +75,8 @@ class UpdateCounter {
       if (inside(view_, region.child(c))) count(region.child(c), std::max(range.begin, range.end));
   }
 
-  /// Shorter chords are where a ray but touches a voxel, voxel lengths: one walk finds them, another does not.
+  /// Shorter chords are where a ray but touches a voxel, voxel lengths: one walk finds them, another does
+  /// not.
   static constexpr float kSliver = 1e-6f;
 
   LatticeStack stack_;

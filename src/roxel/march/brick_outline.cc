@@ -47,7 +47,8 @@ BrickOutline BrickProjection::outline(const Eigen::Vector3i& brick) const {
 /// times that: bricks that hold the centre, or nearly, are everywhere.
 BrickOutline BrickProjection::cut_outline(const Eigen::Vector3d corners[8], double nearest) const {
   BrickOutline outline{kUnbounded, -kUnbounded, kUnbounded, -kUnbounded, {0, 0}};
-  for (int corner = 0; corner < 8; ++corner) outline.depth.end = std::max(outline.depth.end, corners[corner].z());
+  for (int corner = 0; corner < 8; ++corner)
+    outline.depth.end = std::max(outline.depth.end, corners[corner].z());
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3d& p = corners[corner];
     if (p.z() >= nearest) include(p, outline);

@@ -13,8 +13,9 @@ namespace roxel::internal {
 /// Rays from one origin, an axis. All but the direction is made by prepare_rays.
 struct alignas(64) PacketRays {
   double direction[3][kMaxPacketRays];
-  double arc_per_depth[kMaxPacketRays];  ///< world units of arc a unit of depth, in kPacketUnit of a voxel of 1
-  double inverse[3][kMaxPacketRays];     ///< of the direction, in units of depth a world unit; finite
+  double
+      arc_per_depth[kMaxPacketRays];  ///< world units of arc a unit of depth, in kPacketUnit of a voxel of 1
+  double inverse[3][kMaxPacketRays];  ///< of the direction, in units of depth a world unit; finite
   float unit[3][kMaxPacketRays];      ///< direction of length 1
   // What is the same in every brick; positions along a ray are in kPacketUnit of its arc:
   double distance[3][kMaxPacketRays];      ///< between planes of cells
@@ -50,7 +51,7 @@ struct alignas(64) BrickCrossings {
   float to_centre[3][kMaxPacketRays];  ///< from where the ray enters to the centre of the brick's first cell
   std::int32_t count[kMaxPacketRays];  ///< cells met
   std::int32_t cell[PacketSteps::kMaxRows][kMaxPacketRays];
-  float chord[PacketSteps::kMaxRows][kMaxPacketRays];  ///< 0 where there is no cell
+  float chord[PacketSteps::kMaxRows][kMaxPacketRays];         ///< 0 where there is no cell
   std::uint32_t word[PacketSteps::kMaxRows][kMaxPacketRays];  ///< BrickBits::word with the cell's bit
 };
 

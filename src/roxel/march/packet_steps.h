@@ -25,7 +25,8 @@ struct alignas(64) PacketSteps {
   int rows = 0;
   std::uint32_t rays[kMaxRows];  ///< bit `ray`: it has a step in the row
   int brick_count = 0;
-  std::uint32_t bricks[kMaxPacketRays];  ///< that the steps are in (LatticeStack::brick); some may stand twice
+  std::uint32_t
+      bricks[kMaxPacketRays];  ///< that the steps are in (LatticeStack::brick); some may stand twice
 
   std::uint32_t slot[kPadded];
   float length[kPadded];      ///< chord, in voxel lengths of the lattice; above 0

@@ -26,8 +26,8 @@ class Packet {
     std::vector<std::vector<VoxelStep>> steps(kMaxPacketRays);
     while (walk_.next(found_))
       for (int i = 0; i < found_.count; ++i)
-        steps[found_.ray[i]].push_back({found_.slot[i], found_.length[i], found_.weight[i],
-                                        std::numeric_limits<float>::quiet_NaN()});
+        steps[found_.ray[i]].push_back(
+            {found_.slot[i], found_.length[i], found_.weight[i], std::numeric_limits<float>::quiet_NaN()});
     return steps;
   }
 
@@ -177,8 +177,7 @@ TEST(PacketWalk, RowsAndPaddingAreAsPromised) {
     const Eigen::Vector3d origin = rays.any().origin;
     const std::vector<std::uint32_t> bricks = all_bricks(stack, origin);
     packet.walk().begin(origin, {0, 20}, bricks);
-    for (int ray = 0; ray < 1 + i % PacketWalk::rays(); ++ray)
-      packet.walk().add(ray, rays.point() - origin);
+    for (int ray = 0; ray < 1 + i % PacketWalk::rays(); ++ray) packet.walk().add(ray, rays.point() - origin);
     const PacketSteps& found = packet.found();
     while (packet.walk().next(packet.found())) {
       int step = 0;

@@ -1,7 +1,7 @@
 #include "roxel/volume/volume.h"
 
-#include <bit>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <sstream>
 

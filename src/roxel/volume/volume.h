@@ -97,8 +97,8 @@ struct Brick {
   std::array<std::uint16_t, kBrickVoxels> local;
 };
 
-/// The same brick in little memory: voxel v exists where bit v % 32 of word[v / 32] is set, and its slot is that
-/// of the brick plus before[v / 32] plus the bits set below it.
+/// The same brick in little memory: voxel v exists where bit v % 32 of word[v / 32] is set, and its slot is
+/// that of the brick plus before[v / 32] plus the bits set below it.
 struct alignas(64) BrickBits {
   std::array<std::uint32_t, kBrickVoxels / 32> word;
   std::array<std::uint16_t, kBrickVoxels / 32> before;
