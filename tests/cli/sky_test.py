@@ -60,7 +60,7 @@ CHANGES = {
     "sky-rounds": ["--sky-rounds", "1"],
     "sun": ["--sun", "10,20"],
 }
-ELSEWHERE = {"format", "images", "nodes", "up", "sky-masks", "pictures", "threads", "quiet", "verbose", "json", "config", "help"}
+ELSEWHERE = {"format", "images", "node-tolerance", "nodes", "up", "sky-masks", "pictures", "threads", "quiet", "verbose", "json", "config", "help"}
 
 
 class SkyCase(program.Case):
