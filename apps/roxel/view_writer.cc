@@ -84,7 +84,7 @@ void ViewWriter::write(const ViewResult& result) {
   std::lock_guard lock(mutex_);
   if (shown) report_.at(result.view_idx) = std::move(*shown);
   figures_[result.view_idx] = std::move(figures);
-  error_.add(error);
+  errors_[result.view_idx] = error;
   keep_for_overview(result.view_idx, pictures);
 }
 
@@ -167,7 +167,9 @@ void ViewWriter::write_overview() const {
 std::optional<double> ViewWriter::reprojection_rms() const {
   if (std::none_of(figures_.begin(), figures_.end(), [](const ViewFigures& f) { return f.reprojection_rms; }))
     return {};
-  return error_.rms_percent();
+  ImageError all;
+  for (const auto& [view_idx, error] : errors_) all.add(error);
+  return all.rms_percent();
 }
 
 }  // namespace roxel::cli

@@ -52,7 +52,7 @@ class ViewWriter {
   Response response_;
   std::mutex mutex_;
   std::vector<ViewFigures> figures_;
-  ImageError error_;
+  std::map<int, ImageError> errors_;         ///< by view: summed in that order, whichever is written first
   std::map<int, std::vector<Image>> sheet_;  ///< thumbnails by view
   double voxel_size_ = 0;                    ///< 0: there is no report
   std::map<int, ReportView> report_;         ///< by view, those that the page shows

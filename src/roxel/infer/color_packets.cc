@@ -11,8 +11,6 @@ namespace roxel {
 
 namespace {
 
-constexpr float kLeastWeight = 1e-6f;  ///< weights that cannot matter against evidence_half
-
 /// Opacities of the steps.
 ROXEL_KERNEL void opacities_of(const PacketSteps& steps, const VoxelScratch* voxels, float* opacity) {
   for (int i = 0; i < steps.count; ++i) opacity[i] = voxels[steps.slot[i]].tau;
@@ -27,7 +25,7 @@ ROXEL_KERNEL void deposit_samples(const PacketSteps& steps, const float* share, 
                 offsetof(VoxelScratch, evidence) == 9 * sizeof(float));
   for (int i = 0; i < steps.count; ++i) {
     const float w = share[i];
-    if (w < kLeastWeight) continue;
+    if (w < kLeastColorWeight) continue;
     float* const voxel = voxels[steps.slot[i]].mean;
     const int ray = steps.ray[i];
     Floats low, mine_low;

@@ -22,6 +22,7 @@ struct alignas(64) ColorLanes {
 /// Transmittance below which what lies behind is not coloured. The roxels rule gives hidden voxels opacity as
 /// well, so that their colours count for more.
 constexpr float spent_transmittance(UpdateRule rule) { return rule == UpdateRule::kRoxels ? 1e-5f : 1e-3f; }
+inline constexpr float kLeastColorWeight = 1e-6f;  ///< weights that cannot matter against evidence_half
 /// What a region's sample counts for colour: its observation weight, as far as it shows no known background.
 float color_weight(const SampleView& view, const Region& region, const RegionStats& sample,
                    const MarchOptions& options);

@@ -197,6 +197,35 @@ TEST_F(TwoColoredVoxels, FilterRaysColoursVoxelsBehindWithWhatGoesOn) {
   EXPECT_LT((coloured(image_of(seen), true)[1] - seen).norm(), 1e-3);
 }
 
+// What is left of a sample behind many voxels of other colours is divided by little: it must end in time.
+TEST(FilteredColors, StayNumbersBehindManyVoxelsOfOtherColours) {
+  Topology topology(LatticeFrame{{0, 0, 0}, 1, {6, 1, 1}});
+  for (int x = 0; x < 48; ++x) topology.insert({x, 4, 4});
+  Volume volume({topology});
+  for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot) {
+    volume.tau[slot] = 2.2f;  // opacity 0.89, just below the limit
+    volume.color_weight[slot] = 1;
+    volume.color_mean[slot] = {20, -30, 40};
+    volume.color_cov[slot] = {9, 9, 9, 0, 0, 0};
+  }
+  for (const UpdateRule rule : {UpdateRule::kPosterior, UpdateRule::kRoxels}) {
+    const SampleView view = view_of(camera_at({-20, 4.5, 4.5}, {4.5, 4.5, 4.5}, 1, 10),
+                                    plain_image(1, {70, 10, -20}), plan_of({1, 100}, 0));
+    const LatticeStack stack(volume);
+    NodeScratch scratch(stack, volume.tau);
+    MarchOptions options;
+    options.rule = rule;
+    options.filters.rays = true;
+    march_color(stack, {view}, options, false, RunContext(1), scratch);
+    EXPECT_GT(scratch[0].evidence, 0.1f);
+    for (const std::uint32_t number : scratch.entered_bricks()) {
+      const Brick& brick = stack.brick(number);
+      for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count; ++slot)
+        for (int c = 0; c < 6; ++c) ASSERT_LT(std::abs(scratch[slot].cov[c]), 1e9f) << slot;
+    }
+  }
+}
+
 TEST_F(TwoColoredVoxels, FilterBackgroundColoursWithoutItsShare) {
   background_.kind = BackgroundKind::kKnown;
   const Eigen::Vector3d black(5, 0, 0);

@@ -21,7 +21,7 @@ void FilteredColorMarch::deposit(const SampleView& view, const Region& region, c
                                  float weight, const StepChunk& chunk, float& transmittance,
                                  RemovedColor& removed) {
   const Volume& volume = stack_.volume();
-  for (int i = 0; i < chunk.count; ++i) {
+  for (int i = 0; i < chunk.count && goes_on(transmittance); ++i) {
     const std::uint32_t slot = chunk.slot[i];
     VoxelScratch& voxel = scratch_[slot];
     RegionStats seen = sample;
@@ -29,14 +29,18 @@ void FilteredColorMarch::deposit(const SampleView& view, const Region& region, c
       mean_at_voxel(view, region, volume.index(chunk.lattice).frame(), chunk.voxel(i), seen.mean);
     if (options_.filters.rays) seen = removed.apply(seen);
     const float a = one_minus_exp(voxel.tau * chunk.length[i]);
-    const float responsibility = everywhere_ ? 1 : a * transmittance;
-    add_sample(seen, responsibility * chunk.weight[i] * weight, voxel);
+    const float share = (everywhere_ ? 1 : a * transmittance) * chunk.weight[i] * weight;
+    if (share >= kLeastColorWeight) add_sample(seen, share, voxel);
     if (options_.filters.rays && !everywhere_ && volume.color_weight[slot] > 0)
       removed.remove(a, volume.color_mean[slot].data(), volume.color_cov[slot].data(),
                      options_.filters.limit);
     transmittance *= 1 - a;
+    ++counts.steps;
   }
-  counts.steps += chunk.count;
+}
+
+bool FilteredColorMarch::goes_on(float transmittance) const {
+  return everywhere_ || transmittance >= spent_transmittance(options_.rule);
 }
 
 void FilteredColorMarch::march(const ViewInSight& in_sight, const Region& region, double begin,
@@ -47,7 +51,6 @@ void FilteredColorMarch::march(const ViewInSight& in_sight, const Region& region
   const Stretch range = served_range(view, region, begin);
   const Eigen::Vector2d at = region_centre(view, region);
   const Stretch* sight = range.end > range.begin ? in_sight.sight.within(at.x(), at.y(), range) : nullptr;
-  const auto goes_on = [&] { return everywhere_ || transmittance >= spent_transmittance(options_.rule); };
   if (sight) {
     ++counts.rays;
     const Ray ray = view.camera.ray(at.x(), at.y());
@@ -58,10 +61,11 @@ void FilteredColorMarch::march(const ViewInSight& in_sight, const Region& region
         ray, range, sight, chunk_, [&](std::uint32_t brick) { scratch_.enter(brick); },
         [&](const StepChunk& chunk) {
           deposit(view, region, sample, weight, chunk, transmittance, removed);
-          return goes_on();
+          return goes_on(transmittance);
         });
   }
-  if (range.end >= view.plan.range.end || region.level == view.plan.finest_level || !goes_on()) return;
+  if (range.end >= view.plan.range.end || region.level == view.plan.finest_level || !goes_on(transmittance))
+    return;
   for (int c = 0; c < 4; ++c)
     if (const Region child = region.child(c); inside(view, child))
       march(in_sight, child, std::max(range.begin, range.end), transmittance, removed);

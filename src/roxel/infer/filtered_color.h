@@ -33,6 +33,7 @@ class FilteredColorMarch {
              RemovedColor removed);
   void deposit(const SampleView& view, const Region& region, const RegionStats& sample, float weight,
                const StepChunk& chunk, float& transmittance, RemovedColor& removed);
+  bool goes_on(float transmittance) const;
 
   const LatticeStack& stack_;
   const MarchOptions& options_;

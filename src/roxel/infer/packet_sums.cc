@@ -35,7 +35,7 @@ HWY_INLINE FloatMask mask_of(std::uint32_t rays) {
 HWY_INLINE FloatVector expand(const float* from, std::uint32_t rays, FloatMask mask) {
   const FloatTag d;
   const auto values = hn::LoadU(d, from);
-#if HWY_TARGET == HWY_AVX3
+#if HWY_TARGET <= HWY_AVX3  // and what came after it
   static_cast<void>(mask);
   return FloatVector{_mm512_maskz_expand_ps(static_cast<__mmask16>(rays), values.raw)};
 #else

@@ -130,7 +130,7 @@ void KeptColors::keep(std::size_t node) {
   Node& n = nodes_[node];
   const auto held = static_cast<std::int64_t>(n.held_bytes);
   const auto more = std::max<std::int64_t>(static_cast<std::int64_t>(n.colors.bytes()) - held, 0);
-  n.kept = left_bytes_.fetch_sub(more) >= more;
+  n.kept = more == 0 || left_bytes_.fetch_sub(more) >= more;
   if (n.kept) {
     n.held_bytes += static_cast<std::size_t>(more);
     return;

@@ -1,6 +1,8 @@
 #include "roxel/march/brick_lists.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "roxel/base/error.h"
 #include "roxel/march/brick_outline.h"
@@ -119,7 +121,12 @@ BrickLists::BrickLists(const LatticeStack& stack, const PinholeCamera& camera, c
         for (int x = x0; x < x1; ++x) ++l.first[static_cast<std::size_t>(y) * l.columns + x + 1];
     }
     l.first[0] = static_cast<std::uint32_t>(bricks_.size());
-    for (std::size_t i = 1; i < l.first.size(); ++i) l.first[i] += l.first[i - 1];
+    std::size_t entries = bricks_.size();
+    for (std::size_t i = 1; i < l.first.size(); ++i) {
+      entries += l.first[i];
+      l.first[i] += l.first[i - 1];
+    }
+    ROXEL_CHECK(entries <= std::numeric_limits<std::uint32_t>::max());
     bricks_.resize(l.first.back());
     std::vector<std::uint32_t> next(l.first.begin(), l.first.end() - 1);
     for (const SquaresOfBrick& s : squares)

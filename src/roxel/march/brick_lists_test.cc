@@ -33,6 +33,35 @@ SamplePlan plan_to(double far) {
   return plan;
 }
 
+/// Counts the steps that packets find by the lists; fails where one ray's are not the twin's.
+void expect_all_met(const Volume& volume, const PinholeCamera& camera, std::size_t& met) {
+  const LatticeStack stack(volume);
+  const SamplePlan plan = plan_to(30);
+  const BrickLists lists(stack, camera, plan);
+  PacketWalk walk(stack);
+  PacketSteps steps;
+  double begin = plan.range.begin;
+  for (int level = plan.root_level; level >= plan.finest_level; --level) {
+    const Stretch range{begin, std::min(plan.range.end, plan.serves_until(level))};
+    begin = range.end;
+    for (int y = 0; y << level < camera.intrinsics.height; ++y)
+      for (int x = 0; x << level < camera.intrinsics.width; ++x) {
+        const double side = std::ldexp(1, level);
+        const Ray ray = camera.ray(std::min((x + 0.5) * side, 53.0), std::min((y + 0.5) * side, 37.0));
+        walk.begin(ray.origin, range, lists.at(level, x, y));
+        walk.add(0, ray.direction);
+        std::vector<VoxelStep> found;
+        while (walk.next(steps))
+          for (int i = 0; i < steps.count; ++i)
+            if (steps.length[i] >= kSliver)
+              found.push_back(
+                  {steps.slot[i], steps.length[i], steps.weight[i], std::numeric_limits<float>::quiet_NaN()});
+        ASSERT_TRUE(same_as_twin(volume, ray, range, found));
+        met += found.size();
+      }
+  }
+}
+
 class BrickListsTest : public testing::TestWithParam<double> {};
 
 // From outside, from in between the lattices and from within: packets that go by the lists meet what single
@@ -42,37 +71,34 @@ TEST_P(BrickListsTest, PacketsMeetAllThatRaysMeet) {
   std::size_t met = 0;
   for (int trial = 0; trial < 12; ++trial) {
     const Volume volume = nested(0.4, 2, random);
-    const LatticeStack stack(volume);
-    const PinholeCamera camera = camera_somewhere(GetParam(), random);
-    const SamplePlan plan = plan_to(30);
-    const BrickLists lists(stack, camera, plan);
-    PacketWalk walk(stack);
-    PacketSteps steps;
-    double begin = plan.range.begin;
-    for (int level = plan.root_level; level >= plan.finest_level; --level) {
-      const Stretch range{begin, std::min(plan.range.end, plan.serves_until(level))};
-      begin = range.end;
-      for (int y = 0; y << level < camera.intrinsics.height; ++y)
-        for (int x = 0; x << level < camera.intrinsics.width; ++x) {
-          const double side = std::ldexp(1, level);
-          const Ray ray = camera.ray(std::min((x + 0.5) * side, 53.0), std::min((y + 0.5) * side, 37.0));
-          walk.begin(ray.origin, range, lists.at(level, x, y));
-          walk.add(0, ray.direction);
-          std::vector<VoxelStep> found;
-          while (walk.next(steps))
-            for (int i = 0; i < steps.count; ++i)
-              if (steps.length[i] >= kSliver)
-                found.push_back({steps.slot[i], steps.length[i], steps.weight[i],
-                                 std::numeric_limits<float>::quiet_NaN()});
-          ASSERT_TRUE(same_as_twin(volume, ray, range, found));
-          met += found.size();
-        }
-    }
+    expect_all_met(volume, camera_somewhere(GetParam(), random), met);
   }
   EXPECT_GT(met, 10000u);
 }
 
 INSTANTIATE_TEST_SUITE_P(OutsideBetweenAndInside, BrickListsTest, testing::Values(9.0, 3.0, 1.4, 0.3));
+
+// Centres on planes between bricks and on the boxes' faces, where a hair decides which side they are on.
+TEST(BrickLists, CamerasOnPlanesSeeAll) {
+  std::mt19937 random(4);
+  const Volume volume = nested(0.4, 2, random);
+  std::size_t met = 0;
+  for (int k = 0; k < 3; ++k) {
+    const LatticeFrame& frame = volume.index(k).frame();
+    const double side = kBrickSide * frame.voxel_size;
+    for (int corner = 0; corner <= frame.size_in_bricks.x(); ++corner) {
+      PinholeCamera camera;
+      camera.pose.centre = frame.origin + side * Eigen::Vector3d(corner, 1, corner);
+      // Along an axis, and turned off it by little so that rays do not run within the planes.
+      camera.pose.rotation =
+          Eigen::AngleAxisd(0.5 * M_PI * (corner % 4) + 0.003, Eigen::Vector3d(0.01, 1, 0.02).normalized())
+              .toRotationMatrix();
+      camera.intrinsics = {53, 37, 40, 42, 25.3, 19.2, 0.7};
+      expect_all_met(volume, camera, met);
+    }
+  }
+  EXPECT_GT(met, 10000u);
+}
 
 TEST(BrickLists, LeaveOutWhatIsNotSeen) {
   Topology topology(LatticeFrame{{0, 0, 0}, 1, {4, 1, 1}});

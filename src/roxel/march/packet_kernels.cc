@@ -175,8 +175,8 @@ HWY_INLINE int walk_cells(const PacketRays& rays, BrickCrossings& crossings) {
 
 /// Where each ray's BrickBits are, in bytes from those of one of them.
 struct alignas(64) BitTables {
-  const std::int32_t* base = nullptr;
   std::int32_t offset[kMaxPacketRays];
+  const std::int32_t* base = nullptr;
   bool near = true;  ///< otherwise they are too far apart in memory for offsets
 };
 
@@ -320,12 +320,13 @@ void walk(const PacketRays& rays, BrickCrossings& crossings, PacketSteps& steps)
   hn::StoreU(hn::Zero(di), di, steps.ray + steps.count);  // what is read behind the count is harmless
   find_slots(tables, crossings, steps);
   weigh(rays, crossings, steps);
-  // The last vector is filled up.
-  hn::StoreU(hn::Set(di, static_cast<std::int32_t>(steps.slot[0])), di,
-             reinterpret_cast<std::int32_t*>(steps.slot) + steps.count);
-  hn::StoreU(hn::Zero(df), df, steps.length + steps.count);
-  hn::StoreU(hn::Zero(df), df, steps.weight + steps.count);
-  hn::StoreU(hn::Zero(di), di, steps.ray + steps.count);
+  for (int i = steps.count; i < steps.count + kMaxPacketRays; i += kRays) {  // harmless, whoever reads on
+    hn::StoreU(hn::Set(di, static_cast<std::int32_t>(steps.slot[0])), di,
+               reinterpret_cast<std::int32_t*>(steps.slot) + i);
+    hn::StoreU(hn::Zero(df), df, steps.length + i);
+    hn::StoreU(hn::Zero(df), df, steps.weight + i);
+    hn::StoreU(hn::Zero(di), di, steps.ray + i);
+  }
 }
 
 }  // namespace HWY_NAMESPACE

@@ -18,7 +18,8 @@ inline constexpr int kMaxPacketRays = 16;
 struct alignas(64) PacketSteps {
   static constexpr int kMaxRows = 24;  ///< a ray meets at most 3 x 8 - 2 cells of a brick
   static constexpr int kMost = kMaxRows * kMaxPacketRays;
-  /// Arrays are read in whole vectors: behind the count, steps have good slots and no length.
+  /// Arrays are read in whole vectors: the kMaxPacketRays entries behind the count are good slots, ray 0, and
+  /// no length and weight.
   static constexpr int kPadded = kMost + kMaxPacketRays;
 
   int count = 0;

@@ -190,10 +190,11 @@ TEST(PacketWalk, RowsAndPaddingAreAsPromised) {
       }
       ASSERT_EQ(step, found.count);
       for (int s = 0; s < found.count; ++s) ASSERT_GT(found.length[s], 0);
-      for (int s = found.count; found.count > 0 && s < found.count + PacketWalk::rays(); ++s) {
+      for (int s = found.count; found.count > 0 && s < found.count + kMaxPacketRays; ++s) {
         ASSERT_LT(found.slot[s], volume.slot_count());
         ASSERT_EQ(found.length[s], 0);
         ASSERT_EQ(found.weight[s], 0);
+        ASSERT_EQ(found.ray[s], 0);
       }
     }
   }

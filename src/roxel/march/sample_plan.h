@@ -14,7 +14,7 @@
 namespace roxel {
 
 struct SamplePlanOptions {
-  double samples_per_voxel = 2;  ///< m, along an axis, > 0
+  double samples_per_voxel = 1;  ///< m, along an axis, > 0
   bool adaptive = true;          ///< false: the limiting sample size at every depth
   int max_root_level = 6;        ///< roots are at most 2^6 = 64 pixels wide
 };

@@ -39,6 +39,8 @@ constexpr double kScratchBytes = 64;
 constexpr double kKeptShare = 0.6;  ///< of the voxels, for each node
 constexpr double kVoxelsPerBrick = 150;
 constexpr double kWritingBytesPerBrick = 36 * 1024;
+/// Of BrickLists while they are made: outlines, and a dozen squares of samples that a brick is seen in.
+constexpr double kListedBytesPerBrick = 250;
 constexpr double kGiB = 1024.0 * 1024 * 1024;
 constexpr double kProgramBytes = 200e6;  ///< libraries
 constexpr double kMemoryMargin = 1.15;   ///< rather too much than too little
@@ -117,10 +119,10 @@ struct LevelNeeds {
 LevelNeeds level_needs(const LevelEstimate& level, const SampleLoad& load, double largest_image, int nodes,
                        int threads) {
   const double bricks = level.voxels / kVoxelsPerBrick;
-  const double volume = level.voxels * kChannelBytes + bricks * sizeof(Brick);
+  const double volume = level.voxels * kChannelBytes + bricks * (sizeof(Brick) + sizeof(BrickBits));
   // Checkpoints are written, and last of all depth is made, beside what passes work in.
   const double passing =
-      level.voxels * (kTotalsBytes + kScratchBytes * threads) +
+      level.voxels * (kTotalsBytes + kScratchBytes * threads) + threads * bricks * kListedBytesPerBrick +
       std::max(threads * largest_image * kResultBytesPerPixel, bricks * kWritingBytesPerBrick);
   const double loading = threads * largest_image * kDecodedBytesPerPixel;
   LevelNeeds needs;
