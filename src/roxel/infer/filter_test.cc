@@ -162,6 +162,17 @@ TEST_F(TwoVoxelRay, FilterBackgroundNeedsAKnownBackground) {
   EXPECT_EQ(march(image_of(colors_[0]))[0].likelihood, plain[0].likelihood);
 }
 
+/// Colours that grow by (12, 9) a pixel along x and y.
+Image ramp_image() {
+  Image ramp(3, 3, 3);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 3; ++x) {
+      ramp.pixel(x, y)[0] = 50 + 12.0f * x;
+      ramp.pixel(x, y)[1] = -10 + 9.0f * y;
+    }
+  return ramp;
+}
+
 /// Means that a colour march gives to the two voxels of the ray, or NaN where it gives nothing.
 class TwoColoredVoxels : public TwoVoxelRay {
  protected:
@@ -240,12 +251,7 @@ TEST_F(TwoColoredVoxels, FilterBackgroundColoursWithoutItsShare) {
 
 TEST_F(TwoColoredVoxels, InterpolateColoursWithTheColourAtTheVoxelsCentre) {
   camera_ = camera_at({-20, 4.7, 4.4}, {4.5, 4.6, 4.45}, 3, 20);
-  Image ramp(3, 3, 3);
-  for (int y = 0; y < 3; ++y)
-    for (int x = 0; x < 3; ++x) {
-      ramp.pixel(x, y)[0] = 50 + 12.0f * x;
-      ramp.pixel(x, y)[1] = -10 + 9.0f * y;
-    }
+  const Image ramp = ramp_image();
   const auto plain = coloured(ramp);
   filters_.interpolate = true;
   const auto interpolated = coloured(ramp);
@@ -263,12 +269,7 @@ TEST_F(TwoColoredVoxels, InterpolateColoursWithTheColourAtTheVoxelsCentre) {
 TEST_F(TwoVoxelRay, InterpolateComparesTheColourAtTheVoxelsCentre) {
   camera_ = camera_at({-20, 4.7, 4.4}, {4.5, 4.6, 4.45}, 3, 20);
   pixel_ = 1;
-  Image ramp(3, 3, 3);
-  for (int y = 0; y < 3; ++y)
-    for (int x = 0; x < 3; ++x) {
-      ramp.pixel(x, y)[0] = 50 + 12.0f * x;
-      ramp.pixel(x, y)[1] = -10 + 9.0f * y;
-    }
+  const Image ramp = ramp_image();
   const EvaluatedSteps plain = march(ramp);
   filters_.interpolate = true;
   const EvaluatedSteps interpolated = march(ramp);
