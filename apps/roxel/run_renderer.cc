@@ -26,6 +26,7 @@ RunRenderer::RunRenderer(const FinishedRun& run, const RunRendererOptions& optio
     : stack_(run.file.volume), colors_(radiance_colors(run.file.volume, run.file.info.colors, 1)) {
   options_.background = read_from_summary(run.path, [&] { return background(run, options); });
   options_.surround = options.surround;
+  options_.interpolate = !run.file.volume.fitted_color.empty();
 }
 
 Rendering RunRenderer::operator()(const View& view, const RunContext& context) const {

@@ -26,6 +26,7 @@ CHANGES = {
     "far": ([], ["--far", "5"]),
     "filter-background": (BLACK, ["--filter-background"]),
     "filter-rays": ([], ["--filter-rays"]),
+    "fit-colors": ([], ["--no-fit-colors"]),
     "format": ([], ["--format", "colmap"]),
     "illumination": ([], ["--illumination", "gain"]),
     "images": ([], ["--images", "00[012]*"]),

@@ -1,7 +1,6 @@
 #include "roxel/depth/depth_map.h"
 
 #include <cmath>
-#include <optional>
 
 #include "roxel/march/brick_sight.h"
 
@@ -118,18 +117,6 @@ class PixelDepthMarch {
     return summarise(shares_, total, in_world * in_world / 12, options_.estimate);
   }
 
-  /// What the ray of the last at() looks like.
-  RenderedRay rendered(const RenderBeside& render) const {
-    RenderedRay seen;
-    for (std::size_t i = 0; i < steps_.size(); ++i) {
-      const EvaluatedStep step = steps_[i];
-      const bool in_box = step.slot < box_slots_;
-      if (in_box || render.options.surround)
-        seen.add(step.opacity, render.colors[step.slot], steps_.depth(i).middle, in_box);
-    }
-    return seen;
-  }
-
  private:
   const PassOptions& pass_;
   const DepthOptions& options_;
@@ -170,41 +157,30 @@ const OptionTable<DepthOptions>& depth_map_option_table() {
   return table;
 }
 
-std::vector<SeenView> estimate_depth(const LatticeStack& stack, const SampleNode& views,
+std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& views,
                                      const PassOptions& pass, const DepthOptions& options,
-                                     const RenderBeside* render, const RunContext& context,
-                                     NodeScratch& scratch) {
+                                     const RunContext& context, NodeScratch& scratch) {
   PixelDepthMarch march(stack, pass, options, scratch);
-  std::optional<RayRenderer> renderer;
-  if (render) renderer.emplace(stack, render->colors, render->options);
-  std::vector<SeenView> seen;
+  std::vector<DepthMap> maps;
   for (const SampleView& view : views) {
     const int width = view.camera.intrinsics.width, height = view.camera.intrinsics.height;
     const BrickSight sight(stack, view.camera);
-    SeenView out{{Image(width, height, 1), Image(width, height, 1), Image(width, height, 1)}, {}};
-    if (render) out.rendering = {Image(width, height, 3), Image(width, height, 1), Image(width, height, 1)};
+    DepthMap map{Image(width, height, 1), Image(width, height, 1), Image(width, height, 1)};
     for (int y = 0; y < height; ++y) {
       context.throw_if_cancelled();
       for (int x = 0; x < width; ++x) {
-        const Ray ray = view.camera.ray(x + 0.5, y + 0.5);
-        const Stretch* ray_sight = sight.at(x + 0.5, y + 0.5);
         const RegionStats sample = view.pyramid->at(0, x, y);
-        RenderedRay rendered;
-        if (march.has_depth(sample)) {
-          const PixelDepth pixel = march.at(view, sample, ray, ray_sight, x, y);
-          *out.depth.depth.pixel(x, y) = pixel.depth;
-          *out.depth.variance.pixel(x, y) = pixel.variance;
-          *out.depth.opacity.pixel(x, y) = pixel.opacity;
-          if (render) rendered = march.rendered(*render);
-        } else if (render) {
-          rendered = renderer->look(ray, view.plan.range, ray_sight);
-        }
-        if (render) rendered.write(render->options, x, y, out.rendering);
+        if (!march.has_depth(sample)) continue;
+        const PixelDepth pixel =
+            march.at(view, sample, view.camera.ray(x + 0.5, y + 0.5), sight.at(x + 0.5, y + 0.5), x, y);
+        *map.depth.pixel(x, y) = pixel.depth;
+        *map.variance.pixel(x, y) = pixel.variance;
+        *map.opacity.pixel(x, y) = pixel.opacity;
       }
     }
-    seen.push_back(std::move(out));
+    maps.push_back(std::move(map));
   }
-  return seen;
+  return maps;
 }
 
 }  // namespace roxel

@@ -4,7 +4,6 @@
 
 #include "roxel/base/option_table.h"
 #include "roxel/infer/run_pass.h"
-#include "roxel/march/render.h"
 
 namespace roxel {
 
@@ -37,23 +36,10 @@ struct DepthOptions {
 /// Group "Depth": depth-estimate, depth-weight.
 const OptionTable<DepthOptions>& depth_map_option_table();
 
-/// For a rendering beside the depth map, from the same walk along each ray.
-struct RenderBeside {
-  const std::vector<std::array<float, 3>>& colors;  ///< linear RGB, one entry a slot
-  RenderOptions options;
-};
-
-struct SeenView {
-  DepthMap depth;
-  Rendering rendering;  ///< empty where none was asked for
-};
-
-/// The depth maps of a node's views at full resolution (level 0 alone), and with `render` what they look
-/// like. The scratch holds the colours to compare with (compare_with_others). World variance includes s^2/12
-/// for the voxel's extent.
-std::vector<SeenView> estimate_depth(const LatticeStack& stack, const SampleNode& views,
+/// The depth maps of a node's views at full resolution (level 0 alone). The scratch holds the colours to
+/// compare with (compare_with_others). World variance includes s^2/12 for the voxel's extent.
+std::vector<DepthMap> estimate_depth(const LatticeStack& stack, const SampleNode& views,
                                      const PassOptions& pass, const DepthOptions& options,
-                                     const RenderBeside* render, const RunContext& context,
-                                     NodeScratch& scratch);
+                                     const RunContext& context, NodeScratch& scratch);
 
 }  // namespace roxel

@@ -45,11 +45,6 @@ class Sheets : public ::testing::Test {
   }
 
   DepthMap estimate(const DepthOptions& options, const float color[3] = kColor, const Mask& foreground = {}) {
-    return look(options, color, foreground, nullptr).depth;
-  }
-
-  SeenView look(const DepthOptions& options, const float color[3], const Mask& foreground,
-                const RenderBeside* beside) {
     const LatticeStack stack(volume_);
     NodeScratch scratch(stack, volume_.tau);
     Totals totals(volume_.slot_count());
@@ -62,7 +57,7 @@ class Sheets : public ::testing::Test {
     const SampleNode node{view_of(small_camera(), plain_image(8, {color[0], color[1], color[2]}),
                                   plan_of({0.5, 5}, 0), {}, foreground)};
     scratch.compare_with(totals.color);
-    return estimate_depth(stack, node, pass_, options, beside, RunContext(1), scratch).front();
+    return estimate_depth(stack, node, pass_, options, RunContext(1), scratch).front();
   }
 
   Volume volume_;
@@ -191,12 +186,12 @@ TEST_F(Sheets, PredictionLeavesTheNodesOwnColoursOut) {
   CollectedColors collected(volume_.slot_count(), 1, 0);
   collect_color(stack, nodes, pass_, context, nullptr, collected);
   compare_with_others(stack, nodes[0], 0, pass_, collected, context, scratch);
-  const DepthMap alone = estimate_depth(stack, node, pass_, {}, nullptr, context, scratch).front().depth;
+  const DepthMap alone = estimate_depth(stack, node, pass_, {}, context, scratch).front();
   EXPECT_NEAR(*alone.opacity.pixel(4, 4), 0.6, 5e-3);
   pass_.predictive = false;
   scratch.reset();
   compare_with_others(stack, nodes[0], 0, pass_, collected, context, scratch);
-  const DepthMap fooled = estimate_depth(stack, node, pass_, {}, nullptr, context, scratch).front().depth;
+  const DepthMap fooled = estimate_depth(stack, node, pass_, {}, context, scratch).front();
   EXPECT_GT(*fooled.opacity.pixel(4, 4), 0.99);
 }
 
@@ -212,31 +207,6 @@ TEST_F(Sheets, AMaskedPixelIsObjectWhereMostOfItIs) {
   }
 }
 
-TEST_F(Sheets, TheRenderingBesideDepthIsThatOfRender) {
-  build({{4, 0.3}, {7, 0.6}});
-  std::vector<std::array<float, 3>> colors(volume_.slot_count());
-  for (std::size_t slot = 0; slot < colors.size(); ++slot)
-    colors[slot] = {0.001f * static_cast<float>(slot % 500), 0.5f, 0.2f};
-  RenderOptions options;
-  options.background = {0.1f, 0.9f, 0.3f};
-  const RenderBeside beside{colors, options};
-  // The left half is object, whose rays are walked for depth; the right half is walked for the picture alone.
-  Mask foreground(8, 8, 255);
-  for (int y = 0; y < 8; ++y)
-    for (int x = 4; x < 8; ++x) foreground.at(x, y) = 0;
-  pass_.opacity.background.kind = BackgroundKind::kMask;
-  const Rendering seen = look({}, kColor, foreground, &beside).rendering;
-  const Rendering expected =
-      render(LatticeStack(volume_), colors, small_camera(), {0.5, 5}, options, RunContext(1));
-  for (std::size_t i = 0; i < seen.rgb.data().size(); ++i)
-    EXPECT_NEAR(seen.rgb.data()[i], expected.rgb.data()[i], 1e-5);
-  for (int i = 0; i < 64; ++i) {
-    EXPECT_NEAR(seen.opacity.data()[i], expected.opacity.data()[i], 1e-5);
-    EXPECT_NEAR(seen.depth.data()[i], expected.depth.data()[i], 1e-5);
-  }
-  EXPECT_TRUE(look({}, kColor, foreground, nullptr).rendering.rgb.empty());
-}
-
 TEST_F(Sheets, StopsWhenCancelled) {
   build({{7, 0.6}});
   const LatticeStack stack(volume_);
@@ -244,7 +214,7 @@ TEST_F(Sheets, StopsWhenCancelled) {
   RunContext context(1);
   context.cancel();
   const SampleNode node{view_of(small_camera(), plain_image(8, {50, 0, 0}), plan_of({0.5, 5}, 0))};
-  EXPECT_THROW(estimate_depth(stack, node, pass_, {}, nullptr, context, scratch), Cancelled);
+  EXPECT_THROW(estimate_depth(stack, node, pass_, {}, context, scratch), Cancelled);
 }
 
 }  // namespace

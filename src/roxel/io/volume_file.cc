@@ -12,6 +12,7 @@
 
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
+#include "roxel/volume/shown_color.h"
 #include "roxel/volume/vdb_grids.inl"
 
 namespace roxel {
@@ -59,12 +60,6 @@ GridBase::Ptr grid_of(const BrickIndex& index, Get get) {
   return grid;
 }
 
-Vec3f linear_rgb(const Volume& volume, const ColorTransform& colors, std::uint32_t slot) {
-  float rgb[3];
-  colors.to_rgb(volume.color_mean[slot].data(), rgb);
-  return {std::max(0.0f, rgb[0]), std::max(0.0f, rgb[1]), std::max(0.0f, rgb[2])};
-}
-
 // The channels of one lattice as grids, in the order of docs/format.md.
 std::vector<std::pair<std::string, GridBase::Ptr>> channel_grids(const Volume& v, const VolumeInfo& info,
                                                                  int lattice) {
@@ -73,7 +68,7 @@ std::vector<std::pair<std::string, GridBase::Ptr>> channel_grids(const Volume& v
   const auto vector = [&](auto get) { return grid_of<Vec3SGrid>(index, get); };
   return {
       {"opacity", scalar([&](auto s) { return alpha_from_tau(v.tau[s]); })},
-      {"color", vector([&](auto s) { return linear_rgb(v, info.colors, s); })},
+      {"color", vector([&](auto s) { return Vec3f(shown_color(v, info.colors, s).data()); })},
       {"confidence", scalar([&](auto s) { return v.confidence[s]; })},
       {"optical_depth", scalar([&](auto s) { return v.tau[s]; })},
       {"color_mean", vector([&](auto s) { return Vec3f(v.color_mean[s].data()); })},
@@ -98,7 +93,7 @@ void describe(GridBase& grid, const std::string& channel, int lattice, const Lat
   grid.insertMeta("roxel:size_in_bricks", openvdb::Vec3IMetadata({n.x(), n.y(), n.z()}));
 }
 
-openvdb::MetaMap file_metadata(const VolumeInfo& info, int lattice_count) {
+openvdb::MetaMap file_metadata(const VolumeInfo& info, bool fitted, int lattice_count) {
   openvdb::MetaMap meta;
   const WhitePoint& white = info.colors.white();
   meta.insertMeta("roxel:version", openvdb::StringMetadata(ROXEL_VERSION));
@@ -107,6 +102,7 @@ openvdb::MetaMap file_metadata(const VolumeInfo& info, int lattice_count) {
   meta.insertMeta("roxel:color_space", openvdb::StringMetadata(to_string(info.colors.space())));
   meta.insertMeta("roxel:white_point", openvdb::Vec2DMetadata({white.x, white.y}));
   meta.insertMeta("roxel:exposure", openvdb::DoubleMetadata(info.exposure));
+  meta.insertMeta("roxel:color_fitted", openvdb::BoolMetadata(fitted));
   meta.insertMeta("roxel:dataset", openvdb::StringMetadata(info.dataset));
   return meta;
 }
@@ -153,6 +149,11 @@ class Archive {
                            .template getMetadata<openvdb::TypedMetadata<T>>(key);
     if (!entry) refuse(names() + " without metadata \"" + key + "\"");
     return entry->value();
+  }
+  /// Of an entry that older files do not have: false.
+  bool is_set(const std::string& key) const {
+    const auto entry = meta_->getMetadata<openvdb::BoolMetadata>(key);
+    return entry && entry->value();
   }
 
  private:
@@ -245,6 +246,8 @@ void fill_lattice(const Archive& archive, int lattice, Volume& v) {
   scalar("optical_depth", [&](auto s, float x) { v.tau[s] = x; });
   scalar("confidence", [&](auto s, float x) { v.confidence[s] = x; });
   vector("color_mean", [&](auto s, const Vec3f& x) { v.color_mean[s] = {x[0], x[1], x[2]}; });
+  if (!v.fitted_color.empty())
+    vector("color", [&](auto s, const Vec3f& x) { v.fitted_color[s] = {x[0], x[1], x[2]}; });
   vector("color_cov_diag",
          [&](auto s, const Vec3f& x) { std::copy_n(x.asPointer(), 3, v.color_cov[s].data()); });
   vector("color_cov_off",
@@ -274,7 +277,7 @@ void write_volume(const std::filesystem::path& path, const Volume& volume, const
       std::ofstream file;
       file.exceptions(std::ios::failbit | std::ios::badbit);
       file.open(temporary, std::ios::binary);
-      openvdb::io::Stream(file).write(grids, file_metadata(info, count));
+      openvdb::io::Stream(file).write(grids, file_metadata(info, !volume.fitted_color.empty(), count));
       file.close();
     } catch (const std::ios_base::failure&) {
       throw IoError(path.string() + ": writing failed (disc full, or no permission?)");
@@ -293,6 +296,7 @@ VolumeFile read_volume(const std::filesystem::path& path) {
   for (int k = 0; k < archive.value<std::int32_t>("roxel:lattices"); ++k)
     lattices.push_back(topology_from(archive, k));
   file.volume = Volume(std::move(lattices));
+  if (archive.is_set("roxel:color_fitted")) file.volume.fitted_color.resize(file.volume.slot_count());
   for (int k = 0; k < file.volume.lattice_count(); ++k) fill_lattice(archive, k, file.volume);
   return file;
 }

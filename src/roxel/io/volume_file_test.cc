@@ -99,6 +99,19 @@ TEST_F(VolumeFileTest, ComesBackBitForBit) {
   EXPECT_EQ(file.info.dataset, "/data/küche 1");
 }
 
+TEST_F(VolumeFileTest, FittedColoursComeBackAndAreWhatOtherProgramsSee) {
+  Volume volume = random_volume();
+  write_volume(path_, volume, some_info(), SavedLattices::kAll);
+  EXPECT_TRUE(read_volume(path_).volume.fitted_color.empty());
+  volume.fitted_color.resize(volume.slot_count());
+  for (std::uint32_t s = 0; s < volume.slot_count(); ++s)
+    volume.fitted_color[s] = {0.001f * static_cast<float>(s % 700), 0.25f, 3.0f};
+  write_volume(path_, volume, some_info(), SavedLattices::kAll);
+  const Volume back = read_volume(path_).volume;
+  expect_equal(back, volume);
+  EXPECT_EQ(back.fitted_color, volume.fitted_color);
+}
+
 TEST_F(VolumeFileTest, LeavesSurroundOutUnlessAsked) {
   const Volume volume = random_volume();
   write_volume(path_, volume, some_info());

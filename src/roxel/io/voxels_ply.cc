@@ -9,6 +9,7 @@
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
 #include "roxel/volume/saved_voxels.h"
+#include "roxel/volume/shown_color.h"
 
 namespace roxel {
 namespace {
@@ -21,10 +22,8 @@ std::uint8_t srgb_byte(float linear) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(srgb_encode(linear), 0.0f, 1.0f)));
 }
 
-void append_row(const Eigen::Vector3d& centre, const float color[3], const ColorTransform& colors,
-                float alpha, std::vector<char>& rows) {
-  float rgb[3];
-  colors.to_rgb(color, rgb);
+void append_row(const Eigen::Vector3d& centre, const std::array<float, 3>& rgb, float alpha,
+                std::vector<char>& rows) {
   const Eigen::Vector3f x = centre.cast<float>();
   const std::uint8_t bytes[3] = {srgb_byte(rgb[0]), srgb_byte(rgb[1]), srgb_byte(rgb[2])};
   char row[kRowBytes];
@@ -39,7 +38,7 @@ std::vector<char> rows_of(const Volume& volume, const ColorTransform& colors, fl
   std::vector<char> rows;
   for_each_saved_voxel(volume, opacity_threshold, confidence_threshold,
                        [&](std::uint32_t slot, const Eigen::Vector3d& centre, float opacity) {
-                         append_row(centre, volume.color_mean[slot].data(), colors, opacity, rows);
+                         append_row(centre, shown_color(volume, colors, slot), opacity, rows);
                        });
   return rows;
 }

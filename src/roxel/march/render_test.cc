@@ -12,7 +12,7 @@ namespace {
 /// One pixel that looks along x from x = -3, through the centres of voxels (0..7, 0, 0) of size 1.
 PinholeCamera camera_along_x() {
   PinholeCamera camera;
-  camera.intrinsics = {1, 1, 10, 10, 0.5, 0.5, 0};
+  camera.intrinsics = {1, 1, 1000, 1000, 0.5, 0.5, 0};
   camera.pose.rotation << 0, 1, 0, 0, 0, 1, 1, 0, 0;
   camera.pose.centre = {-3, 0.5, 0.5};
   return camera;
@@ -92,6 +92,48 @@ TEST(Render, NothingSeenHasNoDepth) {
   EXPECT_EQ(*seen.depth.pixel(0, 0), 0);
   EXPECT_EQ(*seen.opacity.pixel(0, 0), 0);
   for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(seen.rgb.pixel(0, 0)[c], options.background[c]);
+}
+
+TEST(Render, ColoursBetweenCentresAreInterpolated) {
+  // A slanted ray through a row of opaque voxels at z = 0 whose colours rise along x.
+  Topology topology(LatticeFrame{{0, 0, 0}, 1, {1, 1, 1}});
+  for (int x = 0; x < 8; ++x) topology.insert({x, 0, 0});
+  Volume volume({topology});
+  std::fill(volume.tau.begin(), volume.tau.end(), 16.0f);
+  std::vector<std::array<float, 3>> colors(8);
+  for (int x = 0; x < 8; ++x) colors[x] = {static_cast<float>(x), 1, 0};
+  PinholeCamera camera;
+  camera.intrinsics = {1, 1, 1000, 1000, 0.5, 0.5, 0};
+  camera.pose.rotation << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  camera.pose.centre = {3.75, 0.5, 5};
+  const LatticeStack stack(volume);
+  RenderOptions options;
+  EXPECT_NEAR(render(stack, colors, camera, {0, 100}, options, RunContext(1)).rgb.pixel(0, 0)[0], 3, 1e-5);
+  options.interpolate = true;
+  const Rendering seen = render(stack, colors, camera, {0, 100}, options, RunContext(1));
+  EXPECT_NEAR(seen.rgb.pixel(0, 0)[0], 3.25, 1e-5);
+  EXPECT_NEAR(seen.rgb.pixel(0, 0)[1], 1, 1e-5);
+}
+
+TEST(Render, AWidePixelIsTheMeanOfFourRays) {
+  // Half of the pixel sees the voxel at x = 3, half sees past it.
+  Topology topology(LatticeFrame{{0, 0, 0}, 1, {1, 1, 1}});
+  topology.insert({3, 0, 0});
+  Volume volume({topology});
+  volume.tau[0] = 16;
+  PinholeCamera camera;
+  camera.intrinsics = {1, 1, 5, 5, 0.5, 0.5, 0};
+  camera.pose.rotation << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  camera.pose.centre = {4, 0.5, 5};
+  RenderOptions options;
+  options.background = {0, 1, 0};
+  const SubpixelRays rays(volume.index(0).frame(), camera);
+  ASSERT_EQ(rays.count(), 4);
+  const Rendering seen = render(LatticeStack(volume), {{1, 0, 0}}, camera, {0, 100}, options, RunContext(1));
+  EXPECT_NEAR(*seen.opacity.pixel(0, 0), 0.5, 1e-5);
+  EXPECT_NEAR(seen.rgb.pixel(0, 0)[0], 0.5, 1e-5);
+  EXPECT_NEAR(seen.rgb.pixel(0, 0)[1], 0.5, 1e-5);
+  EXPECT_NEAR(*seen.depth.pixel(0, 0), 4.5, 1e-2);
 }
 
 TEST(Render, StopsWhenCancelled) {

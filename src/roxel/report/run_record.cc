@@ -103,6 +103,15 @@ ordered_json light_json(const LightRecord& light) {
           {"spread", light.spread}};
 }
 
+ordered_json color_fit_json(const std::optional<ColorFitRecord>& fit) {
+  if (!fit) return nullptr;
+  return {{"pixels", fit->pixels},
+          {"rounds", fit->rounds},
+          {"rms_before_percent", fit->rms_before_percent},
+          {"rms_after_percent", fit->rms_after_percent},
+          {"seconds", fit->seconds}};
+}
+
 ordered_json known_bytes(std::int64_t bytes) {
   return bytes > 0 ? ordered_json(bytes) : ordered_json(nullptr);
 }
@@ -165,6 +174,7 @@ ordered_json to_json(const RunRecord& record) {
                     {"levels", list(summary.levels, level_json)},
                     {"passes", list(summary.passes, pass_json)},
                     {"light", list(summary.light, light_json)},
+                    {"color_fit", color_fit_json(summary.color_fit)},
                     {"stages", list(summary.stages, [](const StageRecord& stage) { return to_json(stage); })},
                     {"mesh", record.mesh},
                     {"seconds", summary.seconds},

@@ -146,6 +146,11 @@ void add_color(OptionTable<Options>& table) {
   table.add("predictive", &Options::predictive)
       .help("Compare a ray with what other nodes saw, leaving its own out")
       .source("docs/passes.md: without, clutter grows before every camera");
+  table.add("fit-colors", &Options::fit_colors)
+      .help("Paint voxels with the colours whose interpolated render is nearest to the photographs")
+      .source(
+          "measured: errors of photographs that were left out fall by 31, 11 and 4 % on plane, head and "
+          "templeSparseRing (docs/color.md)");
 }
 
 void add_light(OptionTable<Options>& table) {

@@ -48,6 +48,7 @@ struct ReconstructOptions {
   std::optional<double> uninformative;
   double evidence_half = 0.2;
   bool predictive = true;
+  bool fit_colors = true;
 
   // Background
   BackgroundChoice background = BackgroundChoice::kAuto;

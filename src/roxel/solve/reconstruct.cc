@@ -7,6 +7,7 @@
 #include "roxel/base/error.h"
 #include "roxel/base/peak_memory.h"
 #include "roxel/infer/touch.h"
+#include "roxel/solve/fit_colors.h"
 #include "roxel/solve/gains.h"
 #include "roxel/solve/surface_paint.h"
 #include "roxel/volume/refine.h"
@@ -33,12 +34,20 @@ class LevelProgress {
     for (int l = 1; l < level; ++l) before += std::pow(kGrowth, l - 1);
     const double in_level = (pass - 1 + fraction_of_pass) / options_.passes;
     Progress progress{"volume", level, options_.levels, pass, options_.passes, 0};
-    progress.fraction = share_ * (before + in_level * std::pow(kGrowth, level - 1)) / total_;
+    progress.fraction = share_ * passes_share() * (before + in_level * std::pow(kGrowth, level - 1)) / total_;
+    context_.report(progress);
+  }
+  /// Of the fit of colours, which follows the passes.
+  void report_colors(double fraction) {
+    Progress progress{"colours", 0, 0, 0, 0, share_ * (passes_share() + (1 - passes_share()) * fraction)};
     context_.report(progress);
   }
 
  private:
   static constexpr double kGrowth = 4;
+  /// Of the time; the rest is the fit of colours.
+  double passes_share() const { return options_.fit_colors ? 0.9 : 1.0; }
+
   const ReconstructOptions& options_;
   RunContext& context_;
   double share_;
@@ -366,6 +375,7 @@ class Levels {
         made_.surface_light = samples.paint_by_normal(scene, *daylight_, made_.volume);
       else if (scene.light.local_matching)
         samples.paint(scene, made_.volume);
+      if (options_.fit_colors) fit_to_photographs();
     }
     if (options_.illumination == IlluminationChoice::kAuto && scene.light.from == LightSource::kNone &&
         state.level == level_to_judge_light(scene, options_)) {
@@ -377,6 +387,16 @@ class Levels {
       look_at_skies_again();
     made_.summary.levels.back().seconds += seconds_since(start);
     if (hooks_.after_level) hooks_.after_level(made_.volume, scene, made_.summary);
+  }
+
+  void fit_to_photographs() {
+    const auto start = Clock::now();
+    const SurfaceLight* light = made_.surface_light ? &*made_.surface_light : nullptr;
+    ColorFitRecord record = fit_colors(
+        dataset_, load_, made_.scene, light, context_,
+        [&](double fraction) { progress_.report_colors(fraction); }, made_.volume);
+    record.seconds = seconds_since(start);
+    made_.summary.color_fit = record;
   }
 
   void look_at_skies_again() {

@@ -5,6 +5,7 @@
 
 #include "roxel/base/parallel.h"
 #include "roxel/solve/surface_paint.h"
+#include "roxel/volume/shown_color.h"
 
 namespace roxel {
 namespace {
@@ -41,9 +42,11 @@ class ViewStages {
       for (std::size_t i = begin; i < end; ++i) load_view(views[i], results[i - begin]);
       if (stages_.depth) add_depth(node, worker, results);
       for (ViewResult& result : results) {
-        if (stages_.render && !stages_.depth) result.rendering = render_view(result.view_idx);
         result.view_light = scene_.light.of_view(result.view_idx);
-        if (stages_.render) put_into_light_of(result);
+        if (stages_.render) {
+          result.rendering = render_view(result.view_idx);
+          put_into_light_of(result);
+        }
         visit(result);
         report_one();
       }
@@ -65,20 +68,15 @@ class ViewStages {
     scratch_[worker]->reset();
     compare_with_others(stack_, resident(samples_[node]), node, pass_, collected_, context_,
                         *scratch_[worker]);
-    const std::vector<std::array<float, 3>> colors = colors_for(results.front().view_idx);
-    const RenderBeside beside{colors, render_options()};
-    std::vector<SeenView> seen =
-        estimate_depth(stack_, full, pass_, stages_.depth_options, stages_.render ? &beside : nullptr,
-                       context_, *scratch_[worker]);
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      results[i].depth = std::move(seen[i].depth);
-      results[i].rendering = std::move(seen[i].rendering);
-    }
+    std::vector<DepthMap> maps =
+        estimate_depth(stack_, full, pass_, stages_.depth_options, context_, *scratch_[worker]);
+    for (std::size_t i = 0; i < maps.size(); ++i) results[i].depth = std::move(maps[i]);
   }
 
   RenderOptions render_options() const {
     RenderOptions options;
     options.background = background_radiance(scene_);
+    options.interpolate = !stack_.volume().fitted_color.empty();
     return options;
   }
 
@@ -146,7 +144,7 @@ std::vector<std::array<float, 3>> radiance_colors(const Volume& volume, const Co
                                                   double exposure) {
   std::vector<std::array<float, 3>> colors(volume.slot_count());
   for (std::size_t slot = 0; slot < colors.size(); ++slot) {
-    transform.to_rgb(volume.color_mean[slot].data(), colors[slot].data());
+    colors[slot] = shown_color(volume, transform, static_cast<std::uint32_t>(slot));
     for (float& value : colors[slot]) value *= static_cast<float>(exposure);
   }
   return colors;

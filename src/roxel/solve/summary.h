@@ -2,6 +2,7 @@
 /// What a reconstruction did, why it stopped and what it cost.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,15 @@ struct LightRecord {
   double spread = 0;          ///< of the views' log light: root mean square over views and channels
 };
 
+/// The fit of the voxels' colours to the photographs (fit_colors.h).
+struct ColorFitRecord {
+  std::int64_t pixels = 0;  ///< of the photographs, that are looked at
+  int rounds = 0;
+  double rms_before_percent = 0;  ///< of full scale, as displayed, to first order, of mean colours ...
+  double rms_after_percent = 0;   ///< ... and of fitted ones, what the prior costs included
+  double seconds = 0;
+};
+
 struct LevelRecord {
   double voxel_size = 0;
   std::int64_t voxels_in_box = 0;
@@ -53,6 +63,7 @@ struct Summary {
   std::vector<LevelRecord> levels;
   std::vector<PassRecord> passes;
   std::vector<LightRecord> light;
+  std::optional<ColorFitRecord> color_fit;
   std::vector<StageRecord> stages;
   std::vector<std::string> notes;
   double seconds = 0;

@@ -155,7 +155,7 @@ class Volume {
   /// Slots of lattice 0, the reconstructed box: [0, box_slot_count()).
   std::uint32_t box_slot_count() const;
 
-  // Channels, one entry a slot, all sized slot_count():
+  // Channels, one entry a slot, all but the last sized slot_count():
   std::vector<float> tau;                        ///< optical depth over one voxel length, >= 0
   std::vector<float> confidence;                 ///< n / (n + 2), in [0, 1)
   std::vector<float> color_weight;               ///< summed weight of the colour, w
@@ -163,6 +163,10 @@ class Volume {
   std::vector<std::array<float, 6>> color_cov;   ///< xx, yy, zz, xy, xz, yz
   std::vector<std::array<float, 2>>
       support;  ///< evidence of the last opacity pass: sum r, and exposure (denominator)
+
+  /// Linear RGB >= 0, 1 = display white: what voxels are painted with, interpolated between their centres.
+  /// Empty where that is color_mean, of each voxel for itself.
+  std::vector<std::array<float, 3>> fitted_color;
 
   void resize_channels();
 
