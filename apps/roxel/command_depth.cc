@@ -96,7 +96,8 @@ void march(FinishedRun& run, Input input, const DepthOptions& wanted, const fs::
   for_each_view_result(input.dataset, input.load, made, options, stages, context,
                        [&](const ViewResult& result) {
                          write_depth(depth_path(results, input.dataset.views[result.view_idx].name),
-                                     {result.depth.depth, result.depth.variance, result.depth.opacity});
+                                     {result.depth.depth, result.depth.variance, result.depth.opacity},
+                                     ExrCompression::kNone);  // the stage that follows writes it again
                        });
   run.file.volume = std::move(made.volume);
 }

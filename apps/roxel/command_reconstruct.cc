@@ -243,6 +243,7 @@ class Run {
     stages.depth_options = options_.depth.map;
     stages.progress_begin = kVolumeWritten;
     stages.progress_end = kViewsWritten;
+    if (options_.depth.bp || options_.depth.refine) writer.expect_more_depth();
     if (options_.stages.report) writer.keep_for_report(made_.scene.voxel_size);
     for_each_view_result(input_.dataset, input_.load, made_, options_.reconstruct, stages, session_.context(),
                          [&](const ViewResult& result) { writer.write(result); });

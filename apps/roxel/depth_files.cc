@@ -9,6 +9,7 @@
 #include "roxel/base/peak_memory.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
+#include "roxel/io/kept_images.h"
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
 #include "run_input.h"
@@ -21,52 +22,59 @@ using nlohmann::ordered_json;
 
 constexpr int kHeldShare = 2;  ///< views that refinement holds take one part in so many of what is left
 
-constexpr std::array<const char*, 3> kPlaneChannels{"W", "W.u", "W.v"};
-
-/// Planes between the stage's passes: files of a folder that goes in the end.
-class KeptPlanes {
+/// What is put aside between the stage's passes: files of a folder that goes in the end.
+class PutAside {
  public:
-  KeptPlanes(const fs::path& results, const Dataset& dataset)
-      : folder_(results / ".planes"), dataset_(dataset) {}
-  ~KeptPlanes() {
+  PutAside(const fs::path& results, const Dataset& dataset)
+      : folder_(results / ".aside"), dataset_(dataset), has_layers_(dataset.views.size(), 0) {}
+  ~PutAside() {
     std::error_code ignored;
     fs::remove_all(folder_, ignored);
   }
-  KeptPlanes(const KeptPlanes&) = delete;
-  KeptPlanes& operator=(const KeptPlanes&) = delete;
+  PutAside(const PutAside&) = delete;
+  PutAside& operator=(const PutAside&) = delete;
 
   void keep(int view_idx, const RefinedView& view) const {
     const PlaneMap& map = view.planes;
-    std::vector<FloatChannel> channels{
-        {"V", view.variance}, {"V.shared", view.shared}, {"C", view.correlation}};
-    for (int c = 0; c < 3; ++c) {
-      Image plane(map.width, map.height, 1);
-      for (std::size_t i = 0; i < map.planes.size(); ++i)
-        plane.data()[i] = c == 0 ? map.planes[i].w : c == 1 ? map.planes[i].wu : map.planes[i].wv;
-      channels.push_back({kPlaneChannels[c], std::move(plane)});
+    Image planes(map.width, map.height, 3);
+    for (std::size_t i = 0; i < map.planes.size(); ++i) {
+      planes.data()[3 * i] = map.planes[i].w;
+      planes.data()[3 * i + 1] = map.planes[i].wu;
+      planes.data()[3 * i + 2] = map.planes[i].wv;
     }
-    write_exr(file(view_idx), channels, ExrPrecision::kFloat, ExrCompression::kNone);
+    write_kept_images(file("planes", view_idx), {&planes, &view.variance, &view.shared, &view.correlation});
   }
-
   RefinedView recall(int view_idx) const {
-    const std::vector<FloatChannel> channels = read_exr_channels(file(view_idx));
-    RefinedView view{
-        {}, *find_channel(channels, "V"), *find_channel(channels, "V.shared"), *find_channel(channels, "C")};
-    view.planes = PlaneMap(view.variance.width(), view.variance.height());
-    const Image *w = find_channel(channels, kPlaneChannels[0]),
-                *wu = find_channel(channels, kPlaneChannels[1]),
-                *wv = find_channel(channels, kPlaneChannels[2]);
-    for (std::size_t i = 0; i < view.planes.planes.size(); ++i)
-      view.planes.planes[i] = {w->data()[i], wu->data()[i], wv->data()[i]};
+    std::vector<Image> kept = read_kept_images(file("planes", view_idx));
+    RefinedView view{PlaneMap(kept[0].width(), kept[0].height()), std::move(kept[1]), std::move(kept[2]),
+                     std::move(kept[3])};
+    for (std::size_t i = 0; i < view.planes.planes.size(); ++i) {
+      const float* plane = &kept[0].data()[3 * i];
+      view.planes.planes[i] = {plane[0], plane[1], plane[2]};
+    }
     return view;
   }
 
+  /// What is known before refinement.
+  void keep(int view_idx, const DepthLayers& layers) {
+    write_kept_images(file("layers", view_idx), {&layers.depth, &layers.variance, &layers.opacity,
+                                                 &layers.depth_bp, &layers.variance_bp});
+    has_layers_[view_idx] = 1;
+  }
+  bool has_layers(int view_idx) const { return has_layers_[view_idx] != 0; }
+  DepthLayers recall_layers(int view_idx) const {
+    std::vector<Image> kept = read_kept_images(file("layers", view_idx));
+    return {std::move(kept[0]), std::move(kept[1]), std::move(kept[2]), std::move(kept[3]),
+            std::move(kept[4])};
+  }
+
  private:
-  std::string file(int view_idx) const {
-    return view_path(folder_, "planes", dataset_.views[view_idx].name, ".exr").string();
+  fs::path file(const char* kind, int view_idx) const {
+    return view_path(folder_, kind, dataset_.views[view_idx].name, ".kept");
   }
   fs::path folder_;
   const Dataset& dataset_;
+  std::vector<char> has_layers_;  ///< of each view; each is only ever worked on by one thread at a time
 };
 
 DepthLayers read_layers(const DepthFolders& folders, const View& view) {
@@ -116,20 +124,23 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
                                      const DepthStageOptions& options, RunContext& context,
                                      double progress_begin, double progress_end) {
   const fs::path& results = work.folders.results;
-  const KeptPlanes kept(results, dataset);
+  PutAside aside(results, dataset);
   DepthFiles files;
   files.read = [&](int v) {
+    if (aside.has_layers(v)) return aside.recall_layers(v);
     DepthLayers layers = read_layers(work.folders, dataset.views[v]);
     if (!options.bp) layers.depth_bp = layers.variance_bp = {};  // of an earlier time
     layers.depth_refined = layers.variance_refined = layers.normal = {};
+    if (options.refine && !options.bp) aside.keep(v, layers);  // it is read again
     return layers;
   };
   files.write = [&](int v, const DepthLayers& layers) {
+    if (options.refine && layers.depth_refined.empty()) return aside.keep(v, layers);
     write_depth(depth_path(results, dataset.views[v].name), layers);
-    if (!options.refine || !layers.depth_refined.empty()) write_picture(results, dataset.views[v], layers);
+    write_picture(results, dataset.views[v], layers);
   };
-  files.keep = [&](int v, const RefinedView& view) { kept.keep(v, view); };
-  files.recall = [&](int v) { return kept.recall(v); };
+  files.keep = [&](int v, const RefinedView& view) { aside.keep(v, view); };
+  files.recall = [&](int v) { return aside.recall(v); };
   DepthStageOptions first = options, second = options;
   first.refine = false;
   second.bp = false;

@@ -110,7 +110,8 @@ void ViewWriter::write_files(const ViewResult& result, const std::string& name,
     if (!picture.empty()) write_png(view_path(run_, kind, name, ".png").string(), picture, kAsItIs);
   };
   if (!result.depth.depth.empty())
-    write_depth(depth_path(run_, name), {result.depth.depth, result.depth.variance, result.depth.opacity});
+    write_depth(depth_path(run_, name), {result.depth.depth, result.depth.variance, result.depth.opacity},
+                depth_compression_);
   put("depth", pictures.depth);
   put("render", pictures.render);
   put("error", pictures.error);

@@ -32,6 +32,8 @@ class ViewWriter {
   std::vector<ReportView> report_pictures() const;
   /// Before the first write: pictures for the page are kept, deviations in voxels of this size.
   void keep_for_report(double voxel_size);
+  /// Before the first write: a later stage writes the depth files again, so they need not be small.
+  void expect_more_depth() { depth_compression_ = ExrCompression::kNone; }
   /// Over all views together; none where nothing was rendered.
   std::optional<double> reprojection_rms() const;
 
@@ -54,8 +56,9 @@ class ViewWriter {
   std::vector<ViewFigures> figures_;
   std::map<int, ImageError> errors_;         ///< by view: summed in that order, whichever is written first
   std::map<int, std::vector<Image>> sheet_;  ///< thumbnails by view
-  double voxel_size_ = 0;                    ///< 0: there is no report
-  std::map<int, ReportView> report_;         ///< by view, those that the page shows
+  ExrCompression depth_compression_ = ExrCompression::kZip;
+  double voxel_size_ = 0;             ///< 0: there is no report
+  std::map<int, ReportView> report_;  ///< by view, those that the page shows
 };
 
 /// The pixels whose error counts: the foreground where the view has a mask, else those more opaque than one

@@ -253,9 +253,9 @@ class DepthStage {
   }
 
   /// What refinement starts from.
-  PlaneMap first_planes(int v, const Image& depth, const Image& variance) const {
+  PlaneMap first_planes(int v, const Image& depth, const Image& variance, int threads) const {
     const double focal = mean_focal(small_.views[v].camera);
-    return fit_planes(depth, variance, focal, plane_radius(depth, focal, scene_.voxel_size));
+    return fit_planes(depth, variance, focal, plane_radius(depth, focal, scene_.voxel_size), threads);
   }
 
   MatchView match_view(int v) const {
@@ -266,13 +266,21 @@ class DepthStage {
             matching_color(photo.rgb, scene_.white), std::move(small.depth), std::move(small.variance)};
   }
 
+  /// The view and those that come after it: each thread makes one ready.
+  std::vector<int> next_views(int v) const {
+    std::vector<int> next;
+    const int most = std::min(context_.thread_count(), options_.refine_views);
+    for (int n = v; n < std::min(count_, v + most); ++n) next.push_back(n);
+    return next;
+  }
+
   std::vector<int> refine_one(int v, ViewCache<MatchView>& views, Aside& writing) {
-    const auto own = views.get({v}, small_, context_).front();
+    const auto own = views.get(next_views(v), small_, context_).front();
     const std::vector<int> sources = choose_sources(small_, v, own->depth, options_.refine_views);
     const auto held = views.get(sources, small_, context_);
     std::vector<const MatchView*> pointers;
     for (const auto& view : held) pointers.push_back(view.get());
-    const PlaneMap start = first_planes(v, own->depth, own->variance);
+    const PlaneMap start = first_planes(v, own->depth, own->variance, context_.thread_count());
     RefineOptions options;
     options.patch.radius = options_.refine_radius;
     options.patch.noise = options_.refine_noise;
@@ -320,7 +328,7 @@ class DepthStage {
     DepthLayers layers = files_.read(v);
     const Image before = depth_before(layers), variance = variance_before(layers);
     const SmallDepth small = small_depth(v, before, variance);
-    const PlaneMap first = first_planes(v, small.depth, small.variance);
+    const PlaneMap first = first_planes(v, small.depth, small.variance, 1);
     const int width = before.width(), height = before.height();
     layers.depth_refined = Image(width, height, 1);
     layers.variance_refined = Image(width, height, 1);

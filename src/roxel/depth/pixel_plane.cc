@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "roxel/base/kernel.h"
+#include "roxel/base/parallel.h"
 
 namespace roxel {
 namespace {
@@ -136,21 +137,22 @@ PixelPlane plane_of_normal(const PinholeCamera& camera, double w, const Eigen::V
   return plane;
 }
 
-PlaneMap fit_planes(const Image& depth, const Image& variance, double focal_px, int radius) {
+PlaneMap fit_planes(const Image& depth, const Image& variance, double focal_px, int radius, int threads) {
   const int width = depth.width(), height = depth.height();
   PlaneMap map(width, height);
   const PlaneFit planes(depth, variance, focal_px, radius);
-  PlaneSpan span;
-  for (int y = 0; y < height; ++y)
+  parallel_for(height, threads, [&](std::int64_t row, int) {
+    const int y = static_cast<int>(row);
+    PlaneSpan span;
     for (int first = 0; first < width; first += kSpan) {
       const int count = std::min(kSpan, width - first);
       const float* z = depth.pixel(first, y);
       if (std::none_of(z, z + count, [](float d) { return d > 0; })) continue;
       planes.fit(y, first, count, span);
-      for (int i = 0; i < count; ++i) {
+      for (int i = 0; i < count; ++i)
         if (z[i] > 0) map.at(first + i, y) = {planes.inverse_depth(first + i, y), span.b[i], span.c[i]};
-      }
     }
+  });
   return map;
 }
 

@@ -42,6 +42,6 @@ PixelPlane plane_of_normal(const PinholeCamera& camera, double w, const Eigen::V
 /// Planes with the slope of each pixel's neighbours within `radius` pixels, as they agree with the pixel:
 /// least squares, weighted by 1 / variance, neighbours behind a gap in depth left out; they pass through the
 /// pixel's own depth. Pixels without depth (0) have none.
-PlaneMap fit_planes(const Image& depth, const Image& variance, double focal_px, int radius);
+PlaneMap fit_planes(const Image& depth, const Image& variance, double focal_px, int radius, int threads = 1);
 
 }  // namespace roxel

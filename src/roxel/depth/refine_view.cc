@@ -60,6 +60,7 @@ struct Hypothesis {
   float cost = kNoCost;        ///< negative log-likelihood and -prior
   float correlation = 0;       ///< mean over the views that agree best
   std::uint32_t agreeing = 0;  ///< those views
+  int since = 0;               ///< the half round that found it
 };
 
 /// Refines a view, round by round.
@@ -87,7 +88,7 @@ class ViewRefinement {
     for_each_pixel(-1, [&](int x, int y, std::size_t i) { begin(x, y, i); });
     for (int round = 0; round < options_.iterations; ++round)
       for (int color = 0; color < 2; ++color)
-        for_each_pixel(color, [&](int x, int y, std::size_t i) { improve(x, y, i, round); });
+        for_each_pixel(color, [&](int x, int y, std::size_t i) { improve(x, y, i, round, color); });
     RefinedView out{PlaneMap(width_, height_), Image(width_, height_, 1), Image(width_, height_, 1),
                     Image(width_, height_, 1)};
     for_each_pixel(-1, [&](int x, int y, std::size_t i) { finish(x, y, i, out); });
@@ -236,7 +237,8 @@ class ViewRefinement {
   }
 
   /// Tries the planes of neighbours of the other colour, and random ones ever nearer to the best.
-  void improve(int x, int y, std::size_t i, int round) {
+  void improve(int x, int y, std::size_t i, int round, int color) {
+    const int now = 2 * round + color + 1;  // half rounds; 0: from before them
     if (!std::isfinite(best_[i].cost)) return;
     const Patch patch = patch_at(x, y);
     Hypothesis best = best_[i];
@@ -246,7 +248,9 @@ class ViewRefinement {
       const float off = std::abs(plane.w - best.plane.w) + static_cast<float>(options_.patch.radius) * slope;
       if (off * shift < kSamePlane) return;
       const Hypothesis next = judge(patch, plane, i, best.cost);
-      if (next.cost < best.cost) best = next;
+      if (!(next.cost < best.cost)) return;
+      best = next;
+      best.since = now;
     };
     static constexpr int kNear[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
     constexpr int reach = 5;
@@ -256,6 +260,8 @@ class ViewRefinement {
       if (x + dx < 0 || y + dy < 0 || x + dx >= width_ || y + dy >= height_) continue;
       const Hypothesis& other = best_[static_cast<std::size_t>(y + dy) * width_ + x + dx];
       if (!std::isfinite(other.cost)) continue;
+      // What was no better two half rounds ago is no better now.
+      if (k < 4 && round > 0 && other.since < now - 2) continue;
       attempt(
           {other.plane.at(static_cast<float>(-dx), static_cast<float>(-dy)), other.plane.wu, other.plane.wv});
     }

@@ -51,7 +51,7 @@ std::filesystem::path depth_path(const std::filesystem::path& run, const std::st
   return path;
 }
 
-void write_depth(const std::filesystem::path& path, const DepthLayers& layers) {
+void write_depth(const std::filesystem::path& path, const DepthLayers& layers, ExrCompression compression) {
   std::vector<FloatChannel> planes;
   for (const Channel& channel : kChannels) {
     const Image& image = layers.*channel.image;
@@ -67,7 +67,7 @@ void write_depth(const std::filesystem::path& path, const DepthLayers& layers) {
     ROXEL_CHECK_EQ(layers.normal.channels(), 3);
     for (int c = 0; c < 3; ++c) planes.push_back({kNormal[c], plane_of(layers.normal, c)});
   }
-  write_exr(path.string(), planes);
+  write_exr(path.string(), planes, ExrPrecision::kFloat, compression);
 }
 
 DepthLayers read_depth(const std::filesystem::path& path) {

@@ -55,7 +55,7 @@ struct FloatChannel {
 /// becomes that).
 enum class ExrPrecision { kFloat, kHalf };
 
-/// kNone is for files that are soon read again and go.
+/// kNone is for files that are soon read again and go, or are written anew.
 enum class ExrCompression { kZip, kNone };
 
 /// All planes of one size, at least one; names are unique.

@@ -18,7 +18,7 @@ using openvdb::Coord;
 using MaskTree = openvdb::MaskTree;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-constexpr std::int64_t kPixelsAtOnce = 16'000'000;  ///< of views that are in memory together
+constexpr std::int64_t kPixelsAtOnce = 32'000'000;  ///< of views that are in memory together
 constexpr std::int64_t kViewsShare = 4;  ///< one part in so many of the memory is theirs, if they need that
 constexpr std::int64_t kBytesPerPixel = 4 * sizeof(float);  ///< of a view that is ready
 /// Of one that is being read: the layers of its file, and what is made of them.
@@ -236,9 +236,10 @@ class Fusion {
 
  private:
   /// Calls visit(prepared views of a batch) for one batch after the other, in the order of views. No result
-  /// depends on how many they are.
+  /// depends on how many they are. One batch of all views stays for the next time.
   template <class Visit>
   void for_each_batch(const Visit& visit) {
+    if (!all_views_.empty()) return visit(all_views_);
     const std::int64_t most_pixels =
         std::min(kPixelsAtOnce, options_.most_bytes / (kViewsShare * kBytesPerPixel));
     for (int begin = 0; begin < view_count_;) {
@@ -261,6 +262,7 @@ class Fusion {
       }
       largest_batch_ = std::max(largest_batch_, pixels);
       visit(batch);
+      if (std::ssize(batch) == view_count_) all_views_ = std::move(batch);
     }
   }
 
@@ -341,6 +343,7 @@ class Fusion {
       }
     });
     spread_.reset();
+    all_views_ = {};
   }
 
   void add_votes(const std::vector<PreparedView>& batch, const Voting& vote, Leaf& distance, Leaf& weight,
@@ -368,6 +371,7 @@ class Fusion {
   RunContext& context_;
   std::unique_ptr<DistanceField::Voxels> voxels_;
   std::optional<Spread> spread_;
+  std::vector<PreparedView> all_views_;
   std::int64_t largest_batch_ = 0, largest_view_ = 0;  ///< pixels
 };
 
