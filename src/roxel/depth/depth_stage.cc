@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <future>
 #include <map>
 #include <mutex>
@@ -20,6 +21,7 @@ constexpr double kMostVoxels = 0.8;    ///< of a depth's deviation, as refinemen
 constexpr double kUnconfirmed = 1;     ///< voxels that a depth may move by which no other view sees there
 constexpr double kAnotherSurface = 3;  ///< voxels beyond which a smaller view's pixel saw another surface
 constexpr int kSampleStride = 8;       ///< at most: pixels between samples that sources are chosen by
+constexpr int kMostWriters = 4;
 
 class Clock {
  public:
@@ -31,23 +33,32 @@ class Clock {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// One piece of work at a time beside the caller's own, such as writing what is ready: it throws when the
-/// next one starts, or in the end.
+/// Some pieces of work beside the caller's own, such as writing what is ready; with one thread, in its place.
+/// What they throw is thrown when another one starts, or in the end.
 class Aside {
  public:
-  explicit Aside(bool allowed) : policy_(allowed ? std::launch::async : std::launch::deferred) {}
+  explicit Aside(int threads)
+      : most_(static_cast<std::size_t>(threads)),
+        policy_(threads > 1 ? std::launch::async : std::launch::deferred) {}
   template <class Work>
   void start(Work work) {
-    finish();
-    work_ = std::async(policy_, std::move(work));
+    while (works_.size() >= most_) finish_one();
+    works_.push_back(std::async(policy_, std::move(work)));
   }
   void finish() {
-    if (work_.valid()) work_.get();
+    while (!works_.empty()) finish_one();
   }
 
  private:
+  void finish_one() {
+    std::future<void> first = std::move(works_.front());
+    works_.pop_front();
+    first.get();
+  }
+
+  std::size_t most_;
   std::launch policy_;
-  std::future<void> work_;
+  std::deque<std::future<void>> works_;
 };
 
 /// The views used last, as long as they fit.
@@ -168,7 +179,7 @@ class DepthStage {
   std::vector<std::vector<int>> match_all() {
     ViewCache<MatchView> views([&](int v) { return match_view(v); }, 24, files_.most_held_bytes);
     std::vector<std::vector<int>> sources(count_);
-    Aside writing(context_.thread_count() > 1);
+    Aside writing(writers());
     for (int v = 0; v < count_; ++v) {
       sources[v] = refine_one(v, views, writing);
       report("refining depth", 5);
@@ -177,11 +188,14 @@ class DepthStage {
     return sources;
   }
 
+  /// Views that are written side by side: each holds all that is known of it.
+  int writers() const { return std::min(context_.thread_count(), kMostWriters); }
+
   void refine_all() {
     const Clock clock;
     set_scale();
     const std::vector<std::vector<int>> sources = match_all();
-    Aside writing(context_.thread_count() > 1);
+    Aside writing(writers());
     ViewCache<RefinedView> refined([&](int v) { return files_.recall(v); }, 24, files_.most_held_bytes);
     for (int v = 0; v < count_; ++v) {
       agree_one(v, sources[v], refined, writing);
@@ -325,6 +339,7 @@ class DepthStage {
   /// Each pixel's depth on the plane that shows its surface; as it was before, with the variance that it had
   /// and the volume's normal, where there is no such plane.
   void write_refined(int v, const AgreedView& agreed, const Image& correlation) {
+    DepthStageFigures counts;
     DepthLayers layers = files_.read(v);
     const Image before = depth_before(layers), variance = variance_before(layers);
     const SmallDepth small = small_depth(v, before, variance);
@@ -337,7 +352,7 @@ class DepthStage {
       for (int x = 0; x < width; ++x) {
         const float expected = *before.pixel(x, y);
         if (!(expected > 0)) continue;
-        ++figures_.refined_pixels;
+        ++counts.refined_pixels;
         float z = expected, spread = *variance.pixel(x, y);
         PixelPlane plane = plane_of_pixel(first, scale_, x, y, expected).plane;
         const PlaneOfPixel refined = plane_of_pixel(agreed.planes, scale_, x, y, expected);
@@ -346,8 +361,8 @@ class DepthStage {
           const float moved = 1 / refined.plane.w;
           const bool matched = *correlation.pixel(column, row) > 0;
           const bool confirmed = *agreed.views.pixel(column, row) > 0;
-          figures_.matched_pixels += matched;
-          figures_.agreed_pixels += confirmed;
+          counts.matched_pixels += matched;
+          counts.agreed_pixels += confirmed;
           if (believed(std::abs(moved - expected), matched, confirmed)) {
             plane = refined.plane;
             z = moved;
@@ -361,6 +376,10 @@ class DepthStage {
         for (int c = 0; c < 3; ++c) layers.normal.pixel(x, y)[c] = static_cast<float>(normal[c]);
       }
     files_.write(v, layers);
+    std::lock_guard lock(counting_);
+    figures_.refined_pixels += counts.refined_pixels;
+    figures_.matched_pixels += counts.matched_pixels;
+    figures_.agreed_pixels += counts.agreed_pixels;
   }
 
   /// Whether the smaller view's pixel started from the surface that pixel (x, y) has at `expected`.
@@ -398,6 +417,7 @@ class DepthStage {
   int scale_ = 1;
   Dataset small_;  ///< with the cameras of the smaller views
   std::atomic<int> done_{0};
+  std::mutex counting_;
   DepthStageFigures figures_;
 };
 

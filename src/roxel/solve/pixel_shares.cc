@@ -10,7 +10,7 @@ namespace roxel {
 
 namespace {
 
-constexpr double kApart = 0.5;           ///< voxels between neighbouring pixels that are looked at
+constexpr double kApart = 0.75;          ///< voxels between neighbouring pixels that are looked at
 constexpr double kMostPixels = 1 << 24;  ///< of all views, 16 bytes each
 constexpr std::size_t kPixelGrain = 2048;
 constexpr float kDarkest = 0.005f;     ///< darker colours are displayed as steeply as this one

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
@@ -36,8 +37,18 @@ constexpr std::int64_t kBytesPerLeaf = 7 * (Leaf::SIZE * sizeof(float) + 128);  
 struct PreparedView {
   PinholeCamera camera;
   Image depth, weight, scale, opacity;
-  float continuous = 0;  ///< neighbours whose depths differ by less lie on one surface
+  Eigen::Matrix<double, 3, 4> from_world;  ///< homogeneous pixel position; its z is the depth
+  float continuous = 0;                    ///< neighbours whose depths differ by less lie on one surface
 
+  /// Of blocks of kBlock x kBlock pixels: the smallest depth, 0 where a pixel has none, and the largest.
+  static constexpr int kBlock = 8;
+  Image nearest = {}, farthest = {};
+
+  /// (u, v, depth) of a point.
+  Vector3d project(const Vector3d& x) const {
+    const Vector3d h = from_world.leftCols<3>() * x + from_world.col(3);
+    return {h.x() / h.z(), h.y() / h.z(), h.z()};
+  }
   bool has(int x, int y) const {
     return x >= 0 && y >= 0 && x < depth.width() && y < depth.height() && *depth.pixel(x, y) > 0;
   }
@@ -80,6 +91,55 @@ bool is_depth(float z, float variance) {
   return z > 0 && std::isfinite(z) && variance >= 0 && std::isfinite(variance);
 }
 
+/// Smallest and largest depth of each block.
+void summarise_blocks(PreparedView& view) {
+  constexpr int kBlock = PreparedView::kBlock;
+  const int width = view.depth.width(), height = view.depth.height();
+  const int columns = (width + kBlock - 1) / kBlock, rows = (height + kBlock - 1) / kBlock;
+  view.nearest = Image(columns, rows, 1, std::numeric_limits<float>::infinity());
+  view.farthest = Image(columns, rows, 1);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const float z = *view.depth.pixel(x, y);
+      float& nearest = *view.nearest.pixel(x / kBlock, y / kBlock);
+      float& farthest = *view.farthest.pixel(x / kBlock, y / kBlock);
+      nearest = std::min(nearest, z);
+      farthest = std::max(farthest, z);
+    }
+}
+
+/// Whether a view can say anything of a ball at x: not where it lies outside the image, or more than `band`
+/// behind all that the view sees there.
+bool may_say(const PreparedView& view, const Vector3d& x, double radius, double band) {
+  const Vector3d uvz = view.project(x);
+  const double front = uvz.z() - radius;
+  if (!(front > 0)) return uvz.z() + radius > 0;
+  const Intrinsics& k = view.camera.intrinsics;
+  // A ball's image reaches no farther than this from its centre's: radius over depth, more off the axis.
+  const double off = std::hypot((uvz.x() - k.cx) / k.fx, (uvz.y() - k.cy) / k.fy);
+  const double reach = (std::max(k.fx, k.fy) + std::abs(k.skew)) * radius / front * (1 + off) + 1;
+  const double u0 = uvz.x() - reach, u1 = uvz.x() + reach, v0 = uvz.y() - reach, v1 = uvz.y() + reach;
+  if (u1 < 0 || v1 < 0 || u0 >= view.depth.width() || v0 >= view.depth.height()) return false;
+  const auto block = [](double at, int count) {
+    return std::clamp(static_cast<int>(at) / PreparedView::kBlock, 0, count - 1);
+  };
+  const int columns = view.nearest.width(), rows = view.nearest.height();
+  for (int y = block(std::max(v0, 0.0), rows); y <= block(v1, rows); ++y)
+    for (int column = block(std::max(u0, 0.0), columns); column <= block(u1, columns); ++column)
+      if (!(*view.nearest.pixel(column, y) > 0) || *view.farthest.pixel(column, y) + band >= front)
+        return true;
+  return false;
+}
+
+Eigen::Matrix<double, 3, 4> pixel_from_world(const PinholeCamera& camera) {
+  const Intrinsics& k = camera.intrinsics;
+  Eigen::Matrix3d pixels;
+  pixels << k.fx, k.skew, k.cx, 0, k.fy, k.cy, 0, 0, 1;
+  Eigen::Matrix<double, 3, 4> from_world;
+  from_world << pixels * camera.pose.rotation, -pixels * camera.pose.rotation * camera.pose.centre;
+  return from_world;
+}
+
 PreparedView prepare(FusionView view, const FusionOptions& options) {
   const int width = view.depth.width(), height = view.depth.height();
   ROXEL_CHECK_EQ(width, view.camera.intrinsics.width);
@@ -90,6 +150,7 @@ PreparedView prepare(FusionView view, const FusionOptions& options) {
                    Image(width, height, 1),
                    Image(width, height, 1),
                    std::move(view.opacity),
+                   pixel_from_world(view.camera),
                    static_cast<float>(options.band * options.voxel_size)};
   const float least = static_cast<float>(options.least_sigma * options.voxel_size);
   for (int y = 0; y < height; ++y)
@@ -104,6 +165,7 @@ PreparedView prepare(FusionView view, const FusionOptions& options) {
       *out.scale.pixel(x, y) = scale;
       *out.weight.pixel(x, y) = 1 / (scale * scale * *view.variance.pixel(x, y) + least * least);
     }
+  summarise_blocks(out);
   return out;
 }
 
@@ -142,15 +204,18 @@ struct SpreadSums {
   }
 };
 
+/// floor(u) of u > -16; std::floor is a call where the machine has no instruction for it.
+int below(double u) { return static_cast<int>(u + 16) - 16; }
+
 /// Depth between the four pixels around (u, v), or of the nearest one where they are not on one surface.
 float depth_at(const PreparedView& view, double u, double v) {
   const float nearest = *view.depth.pixel(static_cast<int>(u), static_cast<int>(v));
-  const int x = static_cast<int>(std::floor(u - 0.5)), y = static_cast<int>(std::floor(v - 0.5));
+  const int x = below(u - 0.5), y = below(v - 0.5);
   if (!view.has(x, y) || !view.has(x + 1, y) || !view.has(x, y + 1) || !view.has(x + 1, y + 1))
     return nearest;
   const float a = *view.depth.pixel(x, y), b = *view.depth.pixel(x + 1, y), c = *view.depth.pixel(x, y + 1),
               d = *view.depth.pixel(x + 1, y + 1);
-  const auto [low, high] = std::minmax({a, b, c, d});
+  const float low = std::min(std::min(a, b), std::min(c, d)), high = std::max(std::max(a, b), std::max(c, d));
   if (high - low > view.continuous) return nearest;
   const float s = static_cast<float>(u - 0.5 - x), t = static_cast<float>(v - 0.5 - y);
   return (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d);
@@ -166,7 +231,7 @@ class Voting {
         free_weight_(static_cast<float>(1 / (options.voxel_size * options.voxel_size))) {}
 
   Vote operator()(const PreparedView& view, const Vector3d& x) const {
-    const Vector3d uvz = view.camera.project(x);
+    const Vector3d uvz = view.project(x);
     if (!(uvz.z() > 0 && uvz.x() >= 0 && uvz.y() >= 0 && uvz.x() < view.depth.width() &&
           uvz.y() < view.depth.height()))
       return {};
@@ -187,7 +252,7 @@ class Voting {
   bool beside_surface(const PreparedView& view, const Vector3d& uvz) const {
     const double step = std::clamp(voxel_size_ * view.camera.intrinsics.fx / uvz.z(), 1.0, kFarthestOutline);
     const auto near = [&](double u, double v) {
-      const int x = static_cast<int>(std::floor(u)), y = static_cast<int>(std::floor(v));
+      const int x = below(u), y = below(v);
       return view.has(x, y) && std::abs(*view.depth.pixel(x, y) - static_cast<float>(uvz.z())) < band_;
     };
     return near(uvz.x() - step, uvz.y()) || near(uvz.x() + step, uvz.y()) || near(uvz.x(), uvz.y() - step) ||
@@ -351,11 +416,18 @@ class Fusion {
     float* distances = distance.buffer().data();
     float* weights = weight.buffer().data();
     float* counts = views.buffer().data();
+    constexpr double kMiddle = 0.5 * (Leaf::DIM - 1);
+    const Vector3d corner = voxels_->position(distance.origin());
+    const Vector3d middle = corner + Vector3d::Constant(kMiddle * voxels_->voxel_size);
+    const double radius = std::sqrt(3.0) * kMiddle * voxels_->voxel_size;
+    std::vector<const PreparedView*> speaking;
+    for (const PreparedView& view : batch)
+      if (may_say(view, middle, radius, voxels_->band)) speaking.push_back(&view);
     for (auto it = distance.cbeginValueOn(); it; ++it) {
       const Vector3d x = voxels_->position(it.getCoord());
       const auto n = it.pos();
-      for (const PreparedView& view : batch) {
-        const Vote said = vote(view, x);
+      for (const PreparedView* view : speaking) {
+        const Vote said = vote(*view, x);
         distances[n] += said.weight * said.distance;
         weights[n] += said.weight;
         counts[n] += said.near;
