@@ -1,11 +1,13 @@
 /// roxel COMMAND ...: finds the command, runs it, and turns errors into one line and an exit code.
 
-#include <malloc.h>
-
 #include <cstdio>
 #include <new>
 #include <set>
 #include <sstream>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "command.h"
 #include "roxel/base/error.h"

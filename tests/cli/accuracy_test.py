@@ -35,7 +35,7 @@ class AccuracyCase(program.Case):
             raise unittest.SkipTest(f"test data \"{cls.name}\" is not here; set ROXEL_TEST_DATA to its folder")
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-accuracy-"))
         out = cls.folder / "run"
-        for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", *cls.options, "--no-render", "--no-report", "--quiet"],
+        for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", *cls.options, "--no-report", "--quiet"],
                         ["eval", out, "--truth", data, "-o", cls.folder / "metrics", "--quiet"]):
             done = program.run(*command, timeout=1000)
             assert done.returncode == 0, done.stderr
@@ -44,6 +44,14 @@ class AccuracyCase(program.Case):
     def within(self, method):
         shares = self.metrics["depth"]["methods"][method]["share_within_voxels"]
         return [100 * shares[voxels] for voxels in ("0.5", "1", "2")]
+
+    def check_volume(self, within_1, within_4, empty_given_depth, rms_percent):
+        """Least shares of true pixels, most of empty ones, and the error of renders over the object."""
+        shares = self.metrics["depth"]["methods"]["volume"]["share_within_voxels"]
+        self.assertGreaterEqual(100 * shares["1"], within_1)
+        self.assertGreaterEqual(100 * shares["4"], within_4)
+        self.assertLess(100 * self.metrics["depth"]["share_of_empty_given_depth"], empty_given_depth)
+        self.assertLessEqual(self.metrics["reprojection_rms_percent"], rms_percent)
 
     def f_score(self, share_of_diagonal):
         within = self.metrics["surfaces"][-1]["within"]
@@ -70,6 +78,9 @@ class Plane(AccuracyCase):
     def test_depth_uncertainty_and_surface(self):
         self.check([99, 99.5, 99.8], [0.96, 0.995], -1.1)
 
+    def test_the_volume_and_its_renders(self):
+        self.check_volume(95, 99.5, 3, 2.5)
+
     def test_the_median_of_the_surface_is_near_a_hundredth_of_a_percent_of_the_diagonal(self):
         self.assertLess(self.metrics["surfaces"][-1]["median_to_truth"], 1e-4 * self.diagonal)
 
@@ -79,6 +90,9 @@ class Head(AccuracyCase):
 
     def test_depth_uncertainty_and_surface(self):
         self.check([73, 87.5, 94], [0.93, 0.98], 1.15)
+
+    def test_the_volume_and_its_renders(self):
+        self.check_volume(66, 97, 2, 3)
 
 
 class Courtyard(AccuracyCase):

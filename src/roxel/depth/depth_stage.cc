@@ -22,6 +22,7 @@ constexpr double kUnconfirmed = 1;     ///< voxels that a depth may move by whic
 constexpr double kAnotherSurface = 3;  ///< voxels beyond which a smaller view's pixel saw another surface
 constexpr int kSampleStride = 8;       ///< at most: pixels between samples that sources are chosen by
 constexpr int kMostWriters = 4;
+constexpr double kBytesPerPixelWritten = 64;  ///< of a view that is written
 
 class Clock {
  public:
@@ -189,7 +190,11 @@ class DepthStage {
   }
 
   /// Views that are written side by side: each holds all that is known of it.
-  int writers() const { return std::min(context_.thread_count(), kMostWriters); }
+  int writers() const {
+    const double largest = std::ranges::max(pixels_of_views(dataset_));
+    const double fit = static_cast<double>(files_.most_held_bytes) / (kBytesPerPixelWritten * largest);
+    return std::clamp(static_cast<int>(std::min<double>(fit, kMostWriters)), 1, context_.thread_count());
+  }
 
   void refine_all() {
     const Clock clock;
@@ -243,7 +248,7 @@ class DepthStage {
     for (std::size_t i = 0; i < pixels.data().size(); ++i) {
       const bool valid = photo.valid.empty() || photo.valid.data()[i] > 0;
       const bool surface =
-          photo.foreground.empty() ? opacity.data()[i] >= kEmptyRay : photo.foreground.data()[i] >= 0.5f;
+          photo.foreground.empty() ? opacity.data()[i] >= kEmptyRay : photo.foreground.data()[i] >= 128;
       pixels.data()[i] = valid && surface ? 1.0f : 0.0f;
     }
     return pixels;

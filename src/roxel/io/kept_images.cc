@@ -46,7 +46,7 @@ void write_kept_images(const std::filesystem::path& path, const std::vector<cons
 
 std::vector<Image> read_kept_images(const std::filesystem::path& path) {
   const auto refuse = [&] {
-    throw_invalid(path.string(), "no such file, or one that is cut off", "what this run has put aside there");
+    throw IoError(path.string() + ": missing or cut off: what this run had put aside there");
   };
   std::ifstream file(path, std::ios::binary);
   std::uint32_t head[2] = {0, 0};

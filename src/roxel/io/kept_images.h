@@ -12,7 +12,7 @@ namespace roxel {
 /// Any images, empty ones too. Atomic, makes missing folders; throws IoError.
 void write_kept_images(const std::filesystem::path& path, const std::vector<const Image*>& images);
 
-/// The same images. Throws InvalidInput, naming the file, where it is missing or cut off.
+/// The same images. Throws IoError, naming the file, where it is missing or cut off.
 std::vector<Image> read_kept_images(const std::filesystem::path& path);
 
 }  // namespace roxel

@@ -36,16 +36,16 @@ TEST_F(KeptImages, ComeBackBitForBit) {
 }
 
 TEST_F(KeptImages, AreErrorsWhenMissingCutOffOrOther) {
-  EXPECT_THROW(read_kept_images(path_), InvalidInput);
+  EXPECT_THROW(read_kept_images(path_), IoError);
   const Image image(40, 30, 1);
   write_kept_images(path_, {&image});
   const auto whole = fs::file_size(path_);
   for (const auto size : {whole - 1, whole / 2, std::uintmax_t{11}, std::uintmax_t{0}}) {
     fs::resize_file(path_, size);
-    EXPECT_THROW(read_kept_images(path_), InvalidInput) << size;
+    EXPECT_THROW(read_kept_images(path_), IoError) << size;
   }
   std::ofstream(path_) << "something else altogether, and long enough";
-  EXPECT_THROW(read_kept_images(path_), InvalidInput);
+  EXPECT_THROW(read_kept_images(path_), IoError);
 }
 
 }  // namespace

@@ -76,7 +76,11 @@ void PacketWalk::look_for_bricks() {
     const BrickIndex& index = stack_.volume().index(lattice);
     const LatticeFrame& frame = index.frame();
     const std::uint32_t in_lattice = number - stack_.first_brick(lattice);
-    const Brick& brick = index.bricks()[in_lattice];
+    const BrickBits& brick = index.bits()[in_lattice];
+    if (next_brick_ + 1 < bricks_.size())
+      if (const std::uint32_t after = bricks_[next_brick_ + 1] - stack_.first_brick(lattice);
+          after < index.bits().size())
+        __builtin_prefetch(index.bits()[after].coord.data());
     const double side = kBrickSide * frame.voxel_size;
     double lo[3], hi[3];
     for (int a = 0; a < 3; ++a) {
@@ -88,7 +92,8 @@ void PacketWalk::look_for_bricks() {
         internal::meet_brick(s.rays, lo, hi, range_.begin, range_.end, found.hits) & running_;
     if (meet == 0) continue;
     found.number = number;
-    found.bits = &index.bits()[in_lattice];
+    found.bits = &brick;
+    __builtin_prefetch(brick.word.data());
     found.first_slot = static_cast<std::int32_t>(brick.first_slot);
     found.per_voxel = 1 / frame.voxel_size;
     for (std::uint32_t rays = meet; rays != 0; rays &= rays - 1) {

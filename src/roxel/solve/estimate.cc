@@ -27,13 +27,13 @@ constexpr double kSurroundSteps = 4;         ///< more steps a ray for each surr
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
 // Nanoseconds on one core: a ray-voxel step of the colour and the opacity march, loading a pixel.
-constexpr double kColorStepNs = 45;  // with what is done once a voxel and node
-constexpr double kOpacityStepNs = 55;
+constexpr double kColorStepNs = 27;  // with what is done once a voxel and node
+constexpr double kOpacityStepNs = 40;
 constexpr double kLoadPixelNs = 60;
 constexpr double kDraftCost = 0.45;  ///< of a pass on all samples
 
 // Bytes a voxel: channels of the volume, totals of a pass, and a worker's scratch.
-constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8;
+constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8 + 12;
 constexpr double kTotalsBytes = 80 + 24 + 40 + 8;
 constexpr double kScratchBytes = 64;
 constexpr double kKeptShare = 0.6;  ///< of the voxels, for each node

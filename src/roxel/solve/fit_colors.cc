@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
 
 #include "roxel/base/parallel.h"
 #include "roxel/solve/pixel_shares.h"
@@ -93,7 +94,9 @@ Rgb mixed(const PixelShares& shares, const std::vector<Rgb>& colors) {
 /// Conjugate gradients, preconditioned by the diagonal, each channel for itself.
 class ColorFit {
  public:
-  ColorFit(FitPixels& pixels, std::vector<Rgb> colors, const Rgb& background, const RunContext& context)
+  /// `background` where its colour is known: of others, pixels show only what the volume does.
+  ColorFit(FitPixels& pixels, std::vector<Rgb> colors, const std::optional<Rgb>& background,
+           const RunContext& context)
       : pixels_(pixels), context_(context), colors_(std::move(colors)), background_(background) {}
 
   ColorFitRecord run(const std::function<void(double)>& progress) {
@@ -153,7 +156,9 @@ class ColorFit {
       Rgb error;
       float squares = 0;
       for (int c = 0; c < 3; ++c) {
-        error[c] = static_cast<float>(pixel.target[c]) - seen[c] - (1 - opacity) * background_[c];
+        const auto target = static_cast<float>(pixel.target[c]);
+        const float of_volume = background_ ? target - (1 - opacity) * (*background_)[c] : opacity * target;
+        error[c] = of_volume - seen[c];
         squares += static_cast<float>(pixel.weight[c]) * error[c] * error[c];
       }
       if (!(opacity > 0.5f) || !std::isfinite(squares)) {
@@ -198,7 +203,8 @@ class ColorFit {
   }
 
   float preconditioned(std::size_t slot, int c) const {
-    return residual_[slot][c] / (diagonal_[slot][c] + prior_[slot][c]);
+    const float curvature = diagonal_[slot][c] + prior_[slot][c];
+    return curvature > 0 ? residual_[slot][c] / curvature : 0;  // no pixel shows it, and all is explained
   }
 
   /// One round; false when another is not worth it.
@@ -248,7 +254,7 @@ class ColorFit {
   FitPixels& pixels_;
   const RunContext& context_;
   std::vector<Rgb> colors_;
-  const Rgb background_;
+  const std::optional<Rgb> background_;
   ColorFitRecord record_;
   double left_ = 0;                               ///< weighted square error, and the prior's share
   std::vector<Rgb> residual_, diagonal_, prior_;  ///< the gradient is -2 residual_
@@ -264,8 +270,11 @@ ColorFitRecord fit_colors(const Dataset& dataset, const PhotographLoader& load, 
   const LatticeStack stack(volume);
   const double room = scene.memory.peak_bytes - resident_bytes() - kBytesOfSlot * volume.slot_count();
   FitPixels pixels(dataset, load, scene, surface_light, stack, std::clamp(room, 0.0, kKeptBytes), context);
-  Rgb background = background_radiance(scene);
-  for (float& value : background) value /= static_cast<float>(scene.exposure);
+  std::optional<Rgb> background;
+  if (scene.background.kind == BackgroundKind::kKnown) {
+    background = background_radiance(scene);
+    for (float& value : *background) value /= static_cast<float>(scene.exposure);
+  }
   ColorFit fit(pixels, radiance_colors(volume, scene.transform, 1), background, context);
   const ColorFitRecord record = fit.run(progress);
   volume.fitted_color = fit.take_colors();

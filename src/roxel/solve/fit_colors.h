@@ -12,11 +12,12 @@ namespace roxel {
 
 /// Sets `volume.fitted_color` to the colours c that minimise
 ///
-///   sum over rays of w |photograph - light (sum of r_s c(x_s) + r_bg c_bg)|^2  +  lambda |c - mean colour|^2
+///   sum over pixels of w |photograph - light (sum of r_s c(x_s) + r_bg c_bg)|^2 + lambda |c - mean colour|^2
 ///
 /// with c(x) interpolated (blend_around) and r_s the renderer's (render.h), photographs and renders as a
-/// display shows them, to first order. Rays are at most half a voxel apart; of what the mean colours miss by
-/// far, which is something else than the surface, little is believed. `surface_light` where the light on
+/// display shows them, to first order. Behind the volume, c_bg is the background where its colour is known,
+/// else what the photograph shows. Which pixels: FitPixels. Of what the mean colours miss by far, which is
+/// something else than the surface, little is believed. `surface_light` where the light on
 /// voxels' own surfaces is known, else null. The same bits for any number of threads. `progress` gets
 /// fractions of the fit. Where no pixel shows a voxel, its mean colour stays.
 ColorFitRecord fit_colors(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,

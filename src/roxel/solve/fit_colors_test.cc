@@ -11,8 +11,6 @@
 namespace roxel {
 namespace {
 
-constexpr int kSide = 16;
-constexpr double kVoxel = 0.1;
 constexpr Rgb kBehind = {0.1f, 0.2f, 0.4f};
 
 /// A wall two voxels thick in the plane z = 0 whose true colours change from voxel to voxel, photographed
@@ -20,11 +18,13 @@ constexpr Rgb kBehind = {0.1f, 0.2f, 0.4f};
 /// blurring.
 class PaintedWall : public ::testing::Test {
  protected:
-  PaintedWall() {
-    Topology topology(LatticeFrame{{-0.8, -0.8, -0.4}, kVoxel, {2, 2, 1}});
+  /// `bricks` a side; the wall is as wide for any.
+  explicit PaintedWall(int bricks = 2, int pixels = 48) : side_(8 * bricks), pixels_(pixels) {
+    const double voxel = 1.6 / side_;
+    Topology topology(LatticeFrame{{-0.8, -0.8, -4 * voxel}, voxel, {bricks, bricks, 1}});
     for (int z = 3; z < 5; ++z)
-      for (int y = 0; y < kSide; ++y)
-        for (int x = 0; x < kSide; ++x) topology.insert({x, y, z});
+      for (int y = 0; y < side_; ++y)
+        for (int x = 0; x < side_; ++x) topology.insert({x, y, z});
     volume_ = Volume({topology});
     volume_.resize_channels();
     truth_.resize(volume_.slot_count());
@@ -37,7 +37,7 @@ class PaintedWall : public ::testing::Test {
       for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx) {
           const Rgb at =
-              paint(std::clamp(ijk.x() + dx, 0, kSide - 1), std::clamp(ijk.y() + dy, 0, kSide - 1));
+              paint(std::clamp(ijk.x() + dx, 0, side_ - 1), std::clamp(ijk.y() + dy, 0, side_ - 1));
           for (int c = 0; c < 3; ++c) sum[c] += at[c] / 9;
         }
       volume_.color_mean[slot] = sum;
@@ -46,13 +46,13 @@ class PaintedWall : public ::testing::Test {
       View view;
       view.name = std::to_string(v);
       view.camera = fixture::camera_looking_at_origin({0.9 * std::cos(0.8 * v), 0.9 * std::sin(0.8 * v), 2.5},
-                                                      kPixels, 2.4 * kPixels / 2);
+                                                      pixels_, 2.4 * pixels_ / 2);
       view.lens.intrinsics = view.camera.intrinsics;
       dataset_.views.push_back(view);
     }
     assign_nodes(dataset_);
     scene_.transform = ColorTransform(ColorSpace::kRgb, kWhiteD65);
-    scene_.voxel_size = kVoxel;
+    scene_.voxel_size = voxel;
     scene_.bounds.box = volume_.index(0).frame().box();
     scene_.bounds.views.assign(dataset_.views.size(), {0.1, 10});
     scene_.background.kind = BackgroundKind::kKnown;
@@ -60,7 +60,7 @@ class PaintedWall : public ::testing::Test {
     scene_.memory.peak_bytes = 1e12;
   }
 
-  static constexpr int kPixels = 48;
+  const int side_, pixels_;
 
   static Rgb paint(int x, int y) {
     const auto wave = [&](double a, double b) {
@@ -72,8 +72,8 @@ class PaintedWall : public ::testing::Test {
   template <class Visit>
   void for_each_voxel(Visit&& visit) const {
     for (int z = 3; z < 5; ++z)
-      for (int y = 0; y < kSide; ++y)
-        for (int x = 0; x < kSide; ++x) visit(Eigen::Vector3i(x, y, z), volume_.index(0).slot({x, y, z}));
+      for (int y = 0; y < side_; ++y)
+        for (int x = 0; x < side_; ++x) visit(Eigen::Vector3i(x, y, z), volume_.index(0).slot({x, y, z}));
   }
 
   Rgb light_of(int view) const { return scene_.light.of_view(view); }
@@ -90,8 +90,8 @@ class PaintedWall : public ::testing::Test {
       photo.rgb = render(stack, truth_, view.camera, {0.1, 10}, options, RunContext(1)).rgb;
       for (std::size_t i = 0; i < photo.rgb.data().size(); ++i) photo.rgb.data()[i] *= light_of(v)[i % 3];
       if (v == spoilt_view_)
-        for (int y = kPixels / 2; y < kPixels; ++y)
-          for (int x = 0; x < kPixels; ++x) std::fill_n(photo.rgb.pixel(x, y), 3, 1.0f);
+        for (int y = pixels_ / 2; y < pixels_; ++y)
+          for (int x = 0; x < pixels_; ++x) std::fill_n(photo.rgb.pixel(x, y), 3, 1.0f);
       return photo;
     };
   }
@@ -107,7 +107,7 @@ class PaintedWall : public ::testing::Test {
     double sum = 0;
     int count = 0;
     for_each_voxel([&](const Eigen::Vector3i& ijk, std::uint32_t slot) {
-      if (ijk.z() != 4 || ijk.head<2>().minCoeff() < 1 || ijk.head<2>().maxCoeff() > kSide - 2) return;
+      if (ijk.z() != 4 || ijk.head<2>().minCoeff() < 1 || ijk.head<2>().maxCoeff() > side_ - 2) return;
       for (int c = 0; c < 3; ++c, ++count) sum += std::pow(colors[slot][c] - truth_[slot][c], 2);
     });
     return std::sqrt(sum / count);
@@ -161,6 +161,43 @@ TEST_F(PaintedWall, SameBitsForAnyThreadsAndAnyMemory) {
   EXPECT_EQ(one.fitted_color, tight.fitted_color);
 }
 
+/// So many voxels and pixels that threads meet in sums and parts; four rays a pixel.
+class WideWall : public PaintedWall {
+ protected:
+  WideWall() : PaintedWall(16, 120) {}
+};
+
+TEST_F(WideWall, SameBitsForAnyThreadsAndAnyMemory) {
+  ASSERT_EQ(SubpixelRays(volume_.index(0).frame(), dataset_.views[0].camera).count(), 4);
+  ASSERT_GT(volume_.slot_count(), 1u << 14);
+  Volume one = volume_;
+  const ColorFitRecord record = fit(one);
+  EXPECT_LT(record.rms_after_percent, 0.5 * record.rms_before_percent);
+  for (const double room : {1e12, 0.0}) {
+    scene_.memory.peak_bytes = room;
+    Volume many = volume_;
+    fit(many, 4);
+    EXPECT_EQ(one.fitted_color, many.fitted_color);
+  }
+}
+
+TEST_F(PaintedWall, WhatIsBehindAnUnknownBackgroundIsNotPaintedOntoTheWall) {
+  // The wall lets a third of the light through, and what is seen through it is of its own colour.
+  std::fill(volume_.tau.begin(), volume_.tau.end(), tau_from_alpha(0.42f));
+  scene_.background.kind = BackgroundKind::kUnknown;
+  std::fill(truth_.begin(), truth_.end(), Rgb{0.5f, 0.4f, 0.3f});
+  std::fill(volume_.color_mean.begin(), volume_.color_mean.end(), Rgb{0.5f, 0.4f, 0.3f});
+  const PhotographLoader plain = [&](const View&) {
+    Photograph photo;
+    photo.rgb = Image(pixels_, pixels_, 3);
+    for (std::size_t i = 0; i < photo.rgb.data().size(); ++i) photo.rgb.data()[i] = truth_[0][i % 3];
+    return photo;
+  };
+  fit_colors(
+      dataset_, plain, scene_, nullptr, RunContext(1), [](double) {}, volume_);
+  EXPECT_LT(error(volume_.fitted_color), 0.01);
+}
+
 TEST_F(PaintedWall, LightIsDividedOut) {
   for (int v = 0; v < 8; ++v) scene_.light.of_views.push_back({0.6f + 0.1f * v, 1.0f, 1.3f - 0.1f * v});
   fit(volume_);
@@ -180,13 +217,13 @@ TEST_F(PaintedWall, MasksAndInvalidPixelsAreNotLookedAt) {
   const PhotographLoader all = photographs();
   const PhotographLoader cut = [&](const View& view) {
     Photograph photo = all(view);
-    photo.valid = Mask(kPixels, kPixels, 255);
-    photo.foreground = Mask(kPixels, kPixels, 255);
-    for (int y = 0; y < kPixels; ++y)
-      for (int x = 0; x < kPixels; ++x) {
-        if (x < kPixels / 4) photo.valid.at(x, y) = 0;
-        if (x >= 3 * kPixels / 4) photo.foreground.at(x, y) = 0;
-        if (x < kPixels / 4 || x >= 3 * kPixels / 4) std::fill_n(photo.rgb.pixel(x, y), 3, 1.0f);
+    photo.valid = Mask(pixels_, pixels_, 255);
+    photo.foreground = Mask(pixels_, pixels_, 255);
+    for (int y = 0; y < pixels_; ++y)
+      for (int x = 0; x < pixels_; ++x) {
+        if (x < pixels_ / 4) photo.valid.at(x, y) = 0;
+        if (x >= 3 * pixels_ / 4) photo.foreground.at(x, y) = 0;
+        if (x < pixels_ / 4 || x >= 3 * pixels_ / 4) std::fill_n(photo.rgb.pixel(x, y), 3, 1.0f);
       }
     return photo;
   };
@@ -197,6 +234,21 @@ TEST_F(PaintedWall, MasksAndInvalidPixelsAreNotLookedAt) {
       dataset_, cut, scene_, nullptr, context, [](double) {}, volume_);
   EXPECT_LT(of_cut.pixels, 0.8 * of_all.pixels);
   EXPECT_LT(error(volume_.fitted_color), 0.05);
+}
+
+TEST_F(PaintedWall, PhotographsThatAreExplainedChangeNothing) {
+  scene_.background.kind = BackgroundKind::kUnknown;
+  const PhotographLoader exact = [this](const View&) {
+    Photograph photo;
+    photo.rgb = Image(pixels_, pixels_, 3);
+    return photo;
+  };
+  std::fill(volume_.color_mean.begin(), volume_.color_mean.end(), Rgb{0, 0, 0});
+  const RunContext context(1);
+  fit_colors(
+      dataset_, exact, scene_, nullptr, context, [](double) {}, volume_);
+  for (const Rgb& color : volume_.fitted_color)
+    for (const float value : color) EXPECT_EQ(value, 0);
 }
 
 TEST_F(PaintedWall, WhereNothingIsSeenColoursStay) {

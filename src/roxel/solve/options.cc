@@ -149,7 +149,7 @@ void add_color(OptionTable<Options>& table) {
   table.add("fit-colors", &Options::fit_colors)
       .help("Paint voxels with the colours whose interpolated render is nearest to the photographs")
       .source(
-          "measured: errors of photographs that were left out fall by 31, 11 and 4 % on plane, head and "
+          "measured: errors of photographs that were left out fall by 25, 10 and 4 % on plane, head and "
           "templeSparseRing (docs/color.md)");
 }
 

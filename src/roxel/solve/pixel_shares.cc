@@ -10,8 +10,10 @@ namespace roxel {
 
 namespace {
 
-constexpr double kApart = 0.75;          ///< voxels between neighbouring pixels that are looked at
-constexpr double kMostPixels = 1 << 24;  ///< of all views, 16 bytes each
+constexpr double kApart = 0.35;            ///< voxels between neighbouring pixels that are looked at
+constexpr double kMostPixels = 1 << 24;    ///< of all views, 16 bytes each
+constexpr double kEnoughPixels = 1 << 22;  ///< for few voxels
+constexpr double kPixelsOfVoxel = 3;       ///< surfaces are a fifth of the voxels
 constexpr std::size_t kPixelGrain = 2048;
 constexpr float kDarkest = 0.005f;     ///< darker colours are displayed as steeply as this one
 constexpr float kLeastWeight = 1e-6f;  ///< half precision ends there
@@ -107,6 +109,7 @@ FitPixels::FitPixels(const Dataset& dataset, const PhotographLoader& load, const
                      const RunContext& context)
     : stack_(stack), context_(context), room_(static_cast<std::int64_t>(kept_bytes)) {
   for (std::size_t v = 0; v < dataset.views.size(); ++v) {
+    context.throw_if_cancelled();
     const PinholeCamera& camera = dataset.views[v].camera;
     views_.push_back({camera,
                       view_range(scene, dataset, static_cast<int>(v)),
@@ -119,6 +122,7 @@ FitPixels::FitPixels(const Dataset& dataset, const PhotographLoader& load, const
     context.throw_if_cancelled();
     choose(dataset, load, scene, surface_light, static_cast<int>(v), apart);
   });
+  for (const View& view : views_) room_ -= static_cast<std::int64_t>(view.pixels.size() * sizeof(FitPixel));
   for (std::size_t v = 0; v < views_.size(); ++v)
     for (std::size_t begin = 0; begin < views_[v].pixels.size(); begin += kPixelGrain)
       parts_.push_back({v, begin, std::min(begin + kPixelGrain, views_[v].pixels.size())});
@@ -134,8 +138,9 @@ double FitPixels::common_distance() const {
     }
     return sum;
   };
+  const double most = std::clamp(kPixelsOfVoxel * stack_.volume().slot_count(), kEnoughPixels, kMostPixels);
   double apart = kApart;
-  while (pixels(apart) > kMostPixels) apart *= 1.1;
+  while (pixels(apart) > most) apart *= 1.1;
   return apart;
 }
 

@@ -34,12 +34,13 @@ struct FitPixel {
 /// Slope of the sRGB curve at linear light, 1 = white: by it, small errors count as a display shows them.
 float display_slope(float light);
 
-/// Pixels of all photographs, at most half a voxel apart, at most 2^24 of them.
+/// Pixels of all photographs: a third of a voxel apart, or all where they are wider; farther apart where
+/// there would be more than three for each voxel (or 2^22, if that is more), or than 2^24.
 class FitPixels {
  public:
-  /// Of the views' valid pixels, those that are object where there are masks. Keeps the shares of as many as
-  /// fit into `kept_bytes`, and finds the others' each time anew: results do not depend on it. References are
-  /// kept.
+  /// Of the views' valid pixels, those that are object where there are masks. Of `kept_bytes`, what pixels
+  /// themselves leave is for shares; those that do not fit are found each time anew: results do not depend on
+  /// it. References are kept.
   FitPixels(const Dataset& dataset, const PhotographLoader& load, const Scene& scene,
             const SurfaceLight* surface_light, const LatticeStack& stack, double kept_bytes,
             const RunContext& context);

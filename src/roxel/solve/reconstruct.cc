@@ -367,6 +367,7 @@ class Levels {
   /// first of several levels, and the colours of the last.
   void finish_level(const PassState& state) {
     const auto start = Clock::now();
+    const PeakMemory memory;
     Scene& scene = made_.scene;
     const LevelSamples samples(dataset_, load_, options_, context_,
                                std::ldexp(scene.voxel_size, options_.levels - state.level));
@@ -385,7 +386,9 @@ class Levels {
     if (hooks_.look_at_skies_again && state.level == 1 && options_.levels > 1 &&
         scene.light.from == LightSource::kSky)
       look_at_skies_again();
-    made_.summary.levels.back().seconds += seconds_since(start);
+    LevelRecord& record = made_.summary.levels.back();
+    record.seconds += seconds_since(start);
+    record.peak_memory_bytes = std::max(record.peak_memory_bytes, memory.bytes());
     if (hooks_.after_level) hooks_.after_level(made_.volume, scene, made_.summary);
   }
 

@@ -116,6 +116,7 @@ TEST(Reconstruct, IsTheSameForAnyNumberOfThreads) {
     const Reconstruction many = run(threads);
     EXPECT_EQ(many.volume.tau, one.volume.tau);
     EXPECT_EQ(many.volume.color_mean, one.volume.color_mean);
+    EXPECT_EQ(many.volume.fitted_color, one.volume.fitted_color);
     EXPECT_EQ(many.volume.color_cov, one.volume.color_cov);
     EXPECT_EQ(many.volume.confidence, one.volume.confidence);
     EXPECT_EQ(many.volume.support, one.volume.support);

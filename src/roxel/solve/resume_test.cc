@@ -41,6 +41,7 @@ Watched watched_run(const Variant& variant) {
 void expect_same(const Reconstruction& resumed, const Reconstruction& whole) {
   EXPECT_EQ(resumed.volume.tau, whole.volume.tau);
   EXPECT_EQ(resumed.volume.color_mean, whole.volume.color_mean);
+  EXPECT_EQ(resumed.volume.fitted_color, whole.volume.fitted_color);
   EXPECT_EQ(resumed.volume.color_cov, whole.volume.color_cov);
   EXPECT_EQ(resumed.volume.color_weight, whole.volume.color_weight);
   EXPECT_EQ(resumed.volume.confidence, whole.volume.confidence);

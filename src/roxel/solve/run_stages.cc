@@ -81,15 +81,18 @@ class ViewStages {
   }
 
   Rendering render_view(int view_idx) const {
-    return render(stack_, colors_for(view_idx), dataset_.views[view_idx].camera,
+    std::vector<std::array<float, 3>> lit;
+    return render(stack_, colors_for(view_idx, lit), dataset_.views[view_idx].camera,
                   view_range(scene_, dataset_, view_idx), render_options(), context_);
   }
 
   /// Colours that the view is rendered with: in the light on their own surface where that is known, else
   /// canonical.
-  std::vector<std::array<float, 3>> colors_for(int view_idx) const {
-    return surface_light_ ? in_light_of(*surface_light_, surface_light_->sky_of_view(view_idx), colors_)
-                          : colors_;
+  const std::vector<std::array<float, 3>>& colors_for(int view_idx,
+                                                      std::vector<std::array<float, 3>>& lit) const {
+    if (!surface_light_) return colors_;
+    lit = in_light_of(*surface_light_, surface_light_->sky_of_view(view_idx), colors_);
+    return lit;
   }
 
   /// Canonical colours as the view's photograph shows them.

@@ -121,7 +121,7 @@ bool may_say(const PreparedView& view, const Vector3d& x, double radius, double 
   const double u0 = uvz.x() - reach, u1 = uvz.x() + reach, v0 = uvz.y() - reach, v1 = uvz.y() + reach;
   if (u1 < 0 || v1 < 0 || u0 >= view.depth.width() || v0 >= view.depth.height()) return false;
   const auto block = [](double at, int count) {
-    return std::clamp(static_cast<int>(at) / PreparedView::kBlock, 0, count - 1);
+    return static_cast<int>(std::clamp(at / PreparedView::kBlock, 0.0, count - 1.0));
   };
   const int columns = view.nearest.width(), rows = view.nearest.height();
   for (int y = block(std::max(v0, 0.0), rows); y <= block(v1, rows); ++y)

@@ -1,5 +1,6 @@
 #pragma once
-/// What a voxel is painted with.
+/// What a voxel is painted with in renders and files. (A mesh has the photographs' colours, and where none
+/// shows it mean ones: surface/volume_colors.h.)
 
 #include <array>
 

@@ -66,6 +66,8 @@ BrickIndex::BrickIndex(const Topology& topology, std::uint32_t first_slot)
     std::uint16_t local = 0;
     BrickBits& bits = bits_.emplace_back();
     bits.word.fill(0);
+    bits.coord = {brick.coord.x(), brick.coord.y(), brick.coord.z()};
+    bits.first_slot = brick.first_slot;
     for (auto v = mask._Find_first(); v < mask.size(); v = mask._Find_next(v)) {
       brick.local[v] = local++;
       bits.word[v / 32] |= std::uint32_t{1} << v % 32;

@@ -102,7 +102,10 @@ struct Brick {
 struct alignas(64) BrickBits {
   std::array<std::uint32_t, kBrickVoxels / 32> word;
   std::array<std::uint16_t, kBrickVoxels / 32> before;
+  std::array<std::int32_t, 3> coord;  ///< as the brick's, beside what is read next
+  std::uint32_t first_slot;
 };
+static_assert(sizeof(BrickBits) == 128);
 
 /// A topology compiled for the march: two array reads from a voxel to its slot.
 class BrickIndex {
