@@ -248,7 +248,7 @@ class DepthStage {
     for (std::size_t i = 0; i < pixels.data().size(); ++i) {
       const bool valid = photo.valid.empty() || photo.valid.data()[i] > 0;
       const bool surface =
-          photo.foreground.empty() ? opacity.data()[i] >= kEmptyRay : photo.foreground.data()[i] >= 128;
+          photo.foreground.empty() ? opacity.data()[i] >= kEmptyRay : photo.foreground.data()[i] > 0;
       pixels.data()[i] = valid && surface ? 1.0f : 0.0f;
     }
     return pixels;
