@@ -26,7 +26,7 @@ constexpr int kHeldShare = 2;  ///< views that refinement holds take one part in
 class PutAside {
  public:
   PutAside(const fs::path& results, const Dataset& dataset)
-      : folder_(results / ".aside"), dataset_(dataset), has_layers_(dataset.views.size(), 0) {}
+      : folder_(results / kAsideFolder), dataset_(dataset), has_layers_(dataset.views.size(), 0) {}
   ~PutAside() {
     std::error_code ignored;
     fs::remove_all(folder_, ignored);

@@ -14,6 +14,9 @@ namespace roxel::cli {
 inline constexpr const char* kPropagationStage = "belief propagation";
 inline constexpr const char* kRefinementStage = "refine depth";
 
+/// In a run: what the stage puts aside while it works; goes in the end.
+inline constexpr const char* kAsideFolder = ".aside";
+
 /// Where the stage reads and writes.
 struct DepthFolders {
   std::filesystem::path results;  ///< written to; depth maps in it are read first

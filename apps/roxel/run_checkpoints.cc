@@ -4,6 +4,7 @@
 #include <fstream>
 #include <regex>
 
+#include "depth_files.h"
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/content_hash.h"
 #include "roxel/base/error.h"
@@ -99,7 +100,7 @@ void RunCheckpoints::say_how_to_resume() const {
 void sweep_leftovers(const fs::path& run) {
   static const std::regex temporary(R"(\..*\.[0-9]+\.[0-9]+\.tmp(\..*)?)");
   std::error_code ignored;
-  fs::remove_all(run / ".partial", ignored);
+  for (const char* folder : {".partial", kAsideFolder}) fs::remove_all(run / folder, ignored);
   std::vector<fs::path> left;
   for (fs::recursive_directory_iterator entry(run, ignored), end; !ignored && entry != end;
        entry.increment(ignored))

@@ -58,6 +58,14 @@ class Resume(Case):
     def test_a_finished_run_keeps_no_checkpoint(self):
         self.assertFalse((self.whole / "checkpoint").exists())
 
+    def test_what_a_killed_run_had_put_aside_goes(self):
+        out = self.folder / "untidy"
+        for folder in (".aside/layers", ".partial/depth"):
+            (out / folder).mkdir(parents=True)
+            (out / folder / "000.kept").write_text("half a file")
+        self.succeed("reconstruct", self.data, *OFTEN, "-o", out)
+        self.assertEqual([path.name for path in out.iterdir() if path.name.startswith(".")], [])
+
     def test_killed_at_twenty_random_moments_it_ends_as_if_nothing_had_happened(self):
         out = self.folder / "killed"
         chance = random.Random(1)
