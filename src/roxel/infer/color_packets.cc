@@ -63,6 +63,7 @@ float color_weight(const SampleView& view, const Region& region, const RegionSta
 }
 
 void ColorPackets::tile(const ListedView& listed, const Tile& tile) {
+  if (listed.lists.none_from(listed.view.plan.root_level, tile.x0, tile.y0)) return;
   samples_.clear();
   march_tile(*this, listed, tile);
 }

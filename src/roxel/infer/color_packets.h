@@ -58,6 +58,7 @@ class ColorPackets {
   void march(const SampleView& view, const SamplePacket& packet);
   bool divides(const SampleView& view, std::size_t sample, bool last) const;
   void divided(std::size_t, std::size_t, std::size_t) {}
+  void nothing_behind(const SampleView&, std::size_t) {}
   void level_done(std::size_t) {}
   bool goes_on(float transmittance) const { return everywhere_ || transmittance >= spent_; }
   void deposit(ColorLanes& lanes);

@@ -9,6 +9,35 @@ namespace {
 constexpr float kLeast = 1e-30f;   ///< of likelihoods whose logarithm is taken
 constexpr float kNothing = 1e-6f;  ///< probabilities that are not handed on
 
+/// Weighted logarithms of what samples say.
+struct LogSum {
+  double weight = 0, log = 0;
+};
+
+/// What the finest samples of a region say of the background: the sum of the logarithms of p_bg.
+LogSum background_of(const SampleView& view, const Region& region, const MarchOptions& options) {
+  const SamplePyramid& pyramid = *view.pyramid;
+  const int level = view.plan.last_level(), halvings = region.level - level;
+  const int x1 = std::min((region.x + 1) << halvings, pyramid.width(level));
+  const int y1 = std::min((region.y + 1) << halvings, pyramid.height(level));
+  LogSum sum;
+  float likelihood = 1, log_likelihood = 0;  // most samples are like the one before
+  for (int y = region.y << halvings; y < y1; ++y)
+    for (int x = region.x << halvings; x < x1; ++x) {
+      const RegionStats sample = pyramid.at(level, x, y);
+      if (sample.valid <= 0) continue;
+      const float here = background_likelihood(options.background, options.model, sample);
+      if (here != likelihood) {
+        likelihood = here;
+        log_likelihood = std::log(std::max(here, kLeast));
+      }
+      const float weight = observation_weight(view, {level, x, y}, sample);
+      sum.weight += weight;
+      sum.log += weight * log_likelihood;
+    }
+  return sum;
+}
+
 }  // namespace
 
 bool OpacityPackets::serves(const MarchOptions& options) {
@@ -19,6 +48,7 @@ bool OpacityPackets::serves(const MarchOptions& options) {
 
 void OpacityPackets::tile(const ListedView& listed, const Tile& tile) {
   const SampleView& view = listed.view;
+  if (listed.lists.none_from(view.plan.root_level, tile.x0, tile.y0)) return count_background(view, tile);
   samples_.clear();
   roots_ = 0;
   packets_.clear();
@@ -33,6 +63,16 @@ void OpacityPackets::tile(const ListedView& listed, const Tile& tile) {
     samples_[i].reach = 1;
   }
   distribute();
+}
+
+/// Rays that meet nothing still have their likelihood.
+void OpacityPackets::count_background(const SampleView& view, const Tile& tile) {
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      const LogSum sum = background_of(view, {view.plan.root_level, x, y}, options_);
+      counts.observation_weight += sum.weight;
+      counts.log_likelihood += sum.log;
+    }
 }
 
 /// Adds the region's sample, unless it has no valid pixels.
@@ -68,6 +108,13 @@ bool OpacityPackets::divides(const SampleView&, std::size_t index, bool last) {
 void OpacityPackets::divided(std::size_t sample, std::size_t first_child, std::size_t end_child) {
   samples_[sample].first_child = static_cast<int>(first_child);
   samples_[sample].end_child = static_cast<int>(end_child);
+}
+
+/// What the children would say, were there any.
+void OpacityPackets::nothing_behind(const SampleView& view, std::size_t index) {
+  Sample& sample = samples_[index];
+  const LogSum sum = background_of(view, sample.region, options_);
+  if (sum.weight > 0) sample.behind = static_cast<float>(std::exp(sum.log / sum.weight));
 }
 
 /// Likelihoods from the finest samples up: behind = prod Z_c^{share}.

@@ -54,11 +54,13 @@ class OpacityPackets {
   void march(const SampleView& view, const SamplePacket& packet);
   bool divides(const SampleView& view, std::size_t sample, bool last);
   void divided(std::size_t sample, std::size_t first_child, std::size_t end_child);
+  void nothing_behind(const SampleView& view, std::size_t sample);
   void level_done(std::size_t end_sample) { levels_.push_back({end_sample, packets_.size()}); }
 
   static RegionStats stats_of(const SampleView& view, const Sample& sample) {
     return view.pyramid->at(sample.region.level, sample.region.x, sample.region.y);
   }
+  void count_background(const SampleView& view, const Tile& tile);
   void look_behind(const SampleView& view);
   void distribute();
   void give_out(const Packet& packet);

@@ -24,6 +24,7 @@ struct SamplePacket {
 /// - begin(origin, range, bricks) and add_ray(ray, direction) as PacketWalk, then march(view, packet);
 /// - divides(view, sample, last): whether anything behind the sample matters;
 /// - divided(sample, first_child, end_child): once its children are added;
+/// - nothing_behind(view, sample): instead, where the children could not meet anything;
 /// - level_done(end_sample): once all of a level are marched and divided.
 template <class March>
 void march_tile(March& march, const ListedView& listed, const Tile& tile) {
@@ -73,6 +74,10 @@ void march_tile(March& march, const ListedView& listed, const Tile& tile) {
     for (std::size_t i = first; i < end; ++i) {
       if (!march.divides(view, i, last)) continue;
       const Region region = march.samples()[i].region;
+      if (const Region child = region.child(0); listed.lists.none_from(child.level, child.x, child.y)) {
+        march.nothing_behind(view, i);
+        continue;
+      }
       const std::size_t first_child = march.samples().size();
       for (int c = 0; c < 4; ++c)
         if (const Region child = region.child(c); inside(view, child))

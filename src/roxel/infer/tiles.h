@@ -33,7 +33,7 @@ struct ListedView {
 /// Root samples [x0, x1) x [y0, y1) of a view: so few that what a march keeps of them stays in the cache
 /// nearest to the processor.
 struct Tile {
-  static constexpr int kSide = 8;
+  static constexpr int kSide = BrickLists::kSide;
   int x0, x1, y0, y1;
 };
 

@@ -135,6 +135,21 @@ BrickLists::BrickLists(const LatticeStack& stack, const PinholeCamera& camera, c
           bricks_[next[static_cast<std::size_t>(y) * l.columns + x]++] = s.number;
     begin = std::max(begin, end);
   }
+  look_for_empty_squares();
+}
+
+void BrickLists::look_for_empty_squares() {
+  for (std::size_t i = 0; i < levels_.size(); ++i) {
+    Level& l = levels_[i];
+    l.none_from.resize(l.first.size() - 1);
+    for (std::size_t square = 0; square < l.none_from.size(); ++square)
+      l.none_from[square] = l.first[square] == l.first[square + 1];
+    if (i == 0) continue;
+    const Level& finer = levels_[i - 1];
+    for (std::size_t square = 0; square < finer.none_from.size(); ++square)
+      if (!finer.none_from[square])
+        l.none_from[square / finer.columns / 2 * l.columns + square % finer.columns / 2] = 0;
+  }
 }
 
 }  // namespace roxel

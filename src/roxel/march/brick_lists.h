@@ -30,12 +30,20 @@ class BrickLists {
     const std::size_t tile = static_cast<std::size_t>(y / kSide) * l.columns + x / kSide;
     return {bricks_.data() + l.first[tile], bricks_.data() + l.first[tile + 1]};
   }
+  /// Whether neither the sample nor any that it divides into can meet a brick: the same for all samples of a
+  /// square.
+  bool none_from(int level, int x, int y) const {
+    const Level& l = levels_[level - finest_level_];
+    return l.none_from[static_cast<std::size_t>(y / kSide) * l.columns + x / kSide] != 0;
+  }
 
  private:
   struct Level {
     int columns = 0;
-    std::vector<std::uint32_t> first;  ///< of each square's list, and the end of the last
+    std::vector<std::uint32_t> first;     ///< of each square's list, and the end of the last
+    std::vector<std::uint8_t> none_from;  ///< of each square
   };
+  void look_for_empty_squares();
 
   int finest_level_;
   std::vector<Level> levels_;  ///< from the finest on

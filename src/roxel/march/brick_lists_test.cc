@@ -121,5 +121,41 @@ TEST(BrickLists, LeaveOutWhatIsNotSeen) {
   EXPECT_TRUE(BrickLists(LatticeStack(volume), camera, plan).at(0, 100, 100).empty());
 }
 
+/// Whether the sample or one that it divides into has a list with bricks.
+bool can_meet(const BrickLists& lists, const PinholeCamera& camera, int level, int x, int y) {
+  if (x << level >= camera.intrinsics.width || y << level >= camera.intrinsics.height) return false;
+  if (!lists.at(level, x, y).empty()) return true;
+  for (int c = 0; c < 4 && level > 0; ++c)
+    if (can_meet(lists, camera, level - 1, 2 * x + (c & 1), 2 * y + (c >> 1))) return true;
+  return false;
+}
+
+// A square has nothing from some level on if no list of a sample in it has anything, nor finer ones.
+TEST(BrickLists, KnowWhereNothingCanBeMet) {
+  Topology topology(LatticeFrame{{-8, -4, 0}, 0.5, {8, 2, 2}});
+  topology.insert({30, 3, 3});
+  topology.insert({60, 9, 12});
+  const Volume volume({topology});
+  int none = 0, some = 0;
+  for (const double distance : {-1.0, -3.0, -6.0}) {
+    PinholeCamera camera;
+    camera.pose.centre = {-1, -2, distance};
+    camera.intrinsics = {301, 203, 60, 60, 150, 100, 0};
+    const SamplePlan plan = plan_to(30);
+    const BrickLists lists(LatticeStack(volume), camera, plan);
+    for (int level = 0; level <= 2; ++level)
+      for (int y = 0; y << level < camera.intrinsics.height; y += BrickLists::kSide)
+        for (int x = 0; x << level < camera.intrinsics.width; x += BrickLists::kSide) {
+          bool any = false;
+          for (int i = 0; i < BrickLists::kSide * BrickLists::kSide; ++i)
+            any |= can_meet(lists, camera, level, x + i % BrickLists::kSide, y + i / BrickLists::kSide);
+          ASSERT_EQ(lists.none_from(level, x, y), !any) << distance << ' ' << level << ' ' << x << ' ' << y;
+          ++(any ? some : none);
+        }
+  }
+  EXPECT_GT(none, 100);
+  EXPECT_GT(some, 100);
+}
+
 }  // namespace
 }  // namespace roxel

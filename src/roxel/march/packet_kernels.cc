@@ -1,5 +1,6 @@
 #include "roxel/march/packet_kernels.h"
 
+#include <algorithm>
 #include <cstddef>
 
 #include "roxel/base/vector_targets.h"
@@ -173,6 +174,31 @@ HWY_INLINE int walk_cells(const PacketRays& rays, BrickCrossings& crossings) {
   return rows;
 }
 
+/// Tables of few bricks in registers: what a brick holds is permuted instead of being gathered from memory.
+/// For vectors that hold all words of a brick.
+struct FewBricks {
+  static constexpr int kWords = kBrickVoxels / 32;
+  static constexpr int kMost = kRays == kWords ? 4 : 0;
+
+  int count = 0;  ///< 0: they are more than kMost, or there are none
+  const BrickBits* bits[kMost + 1];
+  std::uint32_t rays[kMost + 1] = {};  ///< bit `ray`: its crossing is in that brick
+};
+
+HWY_INLINE FewBricks few_bricks(const BrickCrossings& crossings) {
+  FewBricks few;
+  for (int ray = 0; ray < kRays && FewBricks::kMost > 0; ++ray) {
+    if (crossings.count[ray] == 0) continue;
+    int which = 0;
+    few.bits[few.count] = crossings.bits[ray];
+    while (few.bits[which] != crossings.bits[ray]) ++which;
+    if (which == FewBricks::kMost) return {};
+    few.rays[which] |= 1u << ray;
+    few.count = std::max(few.count, which + 1);
+  }
+  return few;
+}
+
 /// Where each ray's BrickBits are, in bytes from those of one of them.
 struct alignas(64) BitTables {
   std::int32_t offset[kMaxPacketRays];
@@ -195,27 +221,11 @@ HWY_INLINE void find_tables(const BrickCrossings& crossings, BitTables& tables) 
   tables.base = reinterpret_cast<const std::int32_t*>(base);
 }
 
-/// Finds the word of each cell's bit.
-HWY_INLINE void find_words(const BitTables& tables, int rows, BrickCrossings& crossings) {
-  static_assert(offsetof(BrickBits, word) == 0);
-  if (!tables.near) {
-    for (int ray = 0; ray < kRays; ++ray)
-      for (int row = 0; row < crossings.count[ray]; ++row)
-        crossings.word[row][ray] = crossings.bits[ray]->word[crossings.cell[row][ray] >> 5];
-    return;
-  }
-  const IntTag di;
-  const auto offset = hn::Load(di, tables.offset);
-  for (int row = 0; row < rows; ++row) {
-    const auto which = hn::ShiftRight<5>(hn::Load(di, crossings.cell[row]));
-    const auto at = hn::Add(offset, hn::ShiftLeft<2>(which));
-    hn::Store(hn::GatherOffset(di, tables.base, at), di,
-              reinterpret_cast<std::int32_t*>(crossings.word[row]));
-  }
-}
-
-/// Keeps what exists: chord; `slot` gets the cell's word, and `ray` ray + 16 cell.
-HWY_INLINE void keep_existing(const BrickCrossings& crossings, int rows, PacketSteps& steps) {
+/// Keeps what exists: chord; `slot` gets the cell's word, which word_of(row, cells) finds, and `ray` ray + 16
+/// cell.
+template <class WordOf>
+HWY_INLINE void keep_existing(const BrickCrossings& crossings, int rows, const WordOf& word_of,
+                              PacketSteps& steps) {
   const FloatTag df;
   const IntTag di;
   const UnsignedTag du;
@@ -225,7 +235,7 @@ HWY_INLINE void keep_existing(const BrickCrossings& crossings, int rows, PacketS
   int count = 0, kept_rows = 0;
   for (int row = 0; row < rows; ++row) {
     const auto cell = hn::Load(di, crossings.cell[row]);
-    const auto word = hn::Load(du, crossings.word[row]);
+    const auto word = hn::BitCast(du, word_of(row, cell));
     const auto chord = hn::Load(df, crossings.chord[row]);
     const auto bit = hn::And(hn::Shr(word, hn::BitCast(du, hn::And(cell, in_word))), one);
     const auto exists = hn::And(hn::RebindMask(df, hn::Eq(bit, one)), hn::Gt(chord, hn::Zero(df)));
@@ -244,32 +254,106 @@ HWY_INLINE void keep_existing(const BrickCrossings& crossings, int rows, PacketS
   steps.rows = kept_rows;
 }
 
-/// Slots from words: that of the brick, and how many voxels of it come before.
-HWY_INLINE void find_slots(const BitTables& tables, const BrickCrossings& crossings, PacketSteps& steps) {
+/// Slots from words: where the word's first voxel is, which first_of(ray, which word) finds, and how many of
+/// the word come before.
+template <class FirstOf>
+HWY_INLINE void find_slots(const FirstOf& first_of, PacketSteps& steps) {
   const IntTag di;
   const UnsignedTag du;
   const auto lowest = hn::Set(di, kMaxPacketRays - 1), in_word = hn::Set(di, 31);
   const auto one = hn::Set(du, 1);
-  const auto first_slot = hn::Load(di, crossings.first_slot), offset = hn::Load(di, tables.offset);
-  // An entry is two bytes: it is read with the two before it.
-  constexpr int kBefore = offsetof(BrickBits, before) - 2;
-  const auto before_offset = hn::Set(di, kBefore);
   for (int i = 0; i < steps.count; i += kRays) {
     const auto code = hn::LoadU(di, steps.ray + i);
     const auto cell = hn::And(hn::ShiftRight<4>(code), hn::Set(di, kBrickVoxels - 1));
-    const auto ray = hn::IndicesFromVec(di, hn::And(code, lowest));
     const auto below = hn::Sub(hn::Shl(one, hn::BitCast(du, hn::And(cell, in_word))), one);
     const auto rank = hn::PopulationCount(hn::And(hn::LoadU(du, steps.slot + i), below));
-    auto slot = hn::Add(hn::TableLookupLanes(first_slot, ray), hn::BitCast(di, rank));
-    if (tables.near) {
-      const auto at = hn::Add(hn::Add(hn::TableLookupLanes(offset, ray), before_offset),
-                              hn::ShiftLeft<1>(hn::ShiftRight<5>(cell)));
-      const auto pair = hn::BitCast(du, hn::GatherOffset(di, tables.base, at));
-      slot = hn::Add(slot, hn::BitCast(di, hn::ShiftRight<16>(pair)));
-    }
-    hn::StoreU(hn::BitCast(du, slot), du, steps.slot + i);
+    const auto first = first_of(hn::IndicesFromVec(di, hn::And(code, lowest)), hn::ShiftRight<5>(cell));
+    hn::StoreU(hn::BitCast(du, hn::Add(first, hn::BitCast(di, rank))), du, steps.slot + i);
   }
-  for (int i = 0; !tables.near && i < steps.count; ++i) {
+}
+
+/// The existing voxels of crossings that share few bricks.
+HWY_INLINE void look_up_few(const FewBricks& bricks, int rows, const BrickCrossings& crossings,
+                            PacketSteps& steps) {
+  constexpr int kMost = FewBricks::kMost + 1;
+  const IntTag di;
+  const hn::Rebind<std::uint16_t, IntTag> du16;
+  const auto lane = hn::Shl(hn::Set(di, 1), hn::Iota(di, 0));
+  IntVector words[kMost], first[kMost];
+  hn::Mask<IntTag> rays[kMost];
+  auto brick_of_ray = hn::Zero(di);
+  for (int b = 0; b < bricks.count; ++b) {
+    const BrickBits& brick = *bricks.bits[b];
+    words[b] = hn::Load(di, reinterpret_cast<const std::int32_t*>(brick.word.data()));
+    first[b] = hn::Add(hn::PromoteTo(di, hn::LoadU(du16, brick.before.data())),
+                       hn::Set(di, static_cast<std::int32_t>(brick.first_slot)));
+    rays[b] = hn::TestBit(hn::Set(di, static_cast<std::int32_t>(bricks.rays[b])), lane);
+    brick_of_ray = hn::IfThenElse(rays[b], hn::Set(di, b), brick_of_ray);
+  }
+  const auto word_of = [&](int, const IntVector& cell) HWY_ATTR {
+    const auto which = hn::IndicesFromVec(di, hn::ShiftRight<5>(cell));
+    auto word = hn::TableLookupLanes(words[0], which);
+    for (int b = 1; b < bricks.count; ++b)
+      word = hn::IfThenElse(rays[b], hn::TableLookupLanes(words[b], which), word);
+    return word;
+  };
+  keep_existing(crossings, rows, word_of, steps);
+  find_slots(
+      [&](auto ray, const IntVector& word) HWY_ATTR {
+        const auto which = hn::IndicesFromVec(di, word);
+        auto slot = hn::TableLookupLanes(first[0], which);
+        if (bricks.count == 1) return slot;
+        const auto brick = hn::TableLookupLanes(brick_of_ray, ray);
+        for (int b = 1; b < bricks.count; ++b)
+          slot = hn::IfThenElse(hn::Eq(brick, hn::Set(di, b)), hn::TableLookupLanes(first[b], which), slot);
+        return slot;
+      },
+      steps);
+}
+
+/// The same of any crossings.
+HWY_INLINE void look_up_any(int rows, BrickCrossings& crossings, PacketSteps& steps) {
+  static_assert(offsetof(BrickBits, word) == 0);
+  const IntTag di;
+  BitTables tables;
+  find_tables(crossings, tables);
+  const auto first_slot = hn::Load(di, crossings.first_slot);
+  if (tables.near) {
+    const auto offset = hn::Load(di, tables.offset);
+    keep_existing(
+        crossings, rows,
+        [&](int, const IntVector& cell) HWY_ATTR {
+          return hn::GatherOffset(di, tables.base,
+                                  hn::Add(offset, hn::ShiftLeft<2>(hn::ShiftRight<5>(cell))));
+        },
+        steps);
+    // An entry is two bytes: it is read with the two before it.
+    const auto before_offset = hn::Set(di, static_cast<std::int32_t>(offsetof(BrickBits, before)) - 2);
+    find_slots(
+        [&](auto ray, const IntVector& word) HWY_ATTR {
+          const auto at =
+              hn::Add(hn::Add(hn::TableLookupLanes(offset, ray), before_offset), hn::ShiftLeft<1>(word));
+          const auto pair = hn::BitCast(UnsignedTag(), hn::GatherOffset(di, tables.base, at));
+          return hn::Add(hn::TableLookupLanes(first_slot, ray), hn::BitCast(di, hn::ShiftRight<16>(pair)));
+        },
+        steps);
+    return;
+  }
+  alignas(64) std::int32_t words[kMaxPacketRays];
+  keep_existing(
+      crossings, rows,
+      [&](int row, const IntVector&) HWY_ATTR {
+        for (int ray = 0; ray < kRays; ++ray)
+          words[ray] =
+              row < crossings.count[ray]
+                  ? static_cast<std::int32_t>(crossings.bits[ray]->word[crossings.cell[row][ray] >> 5])
+                  : 0;
+        return hn::Load(di, words);
+      },
+      steps);
+  find_slots([&](auto ray, const IntVector&) HWY_ATTR { return hn::TableLookupLanes(first_slot, ray); },
+             steps);
+  for (int i = 0; i < steps.count; ++i) {
     const int code = steps.ray[i];
     steps.slot[i] += crossings.bits[code & (kMaxPacketRays - 1)]->before[code >> 9];
   }
@@ -310,15 +394,15 @@ HWY_INLINE void weigh(const PacketRays& rays, const BrickCrossings& crossings, P
 
 void walk(const PacketRays& rays, BrickCrossings& crossings, PacketSteps& steps) {
   const int rows = walk_cells(rays, crossings);
-  BitTables tables;
-  find_tables(crossings, tables);
-  find_words(tables, rows, crossings);
-  keep_existing(crossings, rows, steps);
+  const FewBricks bricks = few_bricks(crossings);
+  if (bricks.count > 0)
+    look_up_few(bricks, rows, crossings, steps);
+  else
+    look_up_any(rows, crossings, steps);
   if (steps.count == 0) return;
   const FloatTag df;
   const IntTag di;
   hn::StoreU(hn::Zero(di), di, steps.ray + steps.count);  // what is read behind the count is harmless
-  find_slots(tables, crossings, steps);
   weigh(rays, crossings, steps);
   for (int i = steps.count; i < steps.count + kMaxPacketRays; i += kRays) {  // harmless, whoever reads on
     hn::StoreU(hn::Set(di, static_cast<std::int32_t>(steps.slot[0])), di,

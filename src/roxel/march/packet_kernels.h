@@ -51,8 +51,7 @@ struct alignas(64) BrickCrossings {
   float to_centre[3][kMaxPacketRays];  ///< from where the ray enters to the centre of the brick's first cell
   std::int32_t count[kMaxPacketRays];  ///< cells met
   std::int32_t cell[PacketSteps::kMaxRows][kMaxPacketRays];
-  float chord[PacketSteps::kMaxRows][kMaxPacketRays];         ///< 0 where there is no cell
-  std::uint32_t word[PacketSteps::kMaxRows][kMaxPacketRays];  ///< BrickBits::word with the cell's bit
+  float chord[PacketSteps::kMaxRows][kMaxPacketRays];  ///< 0 where there is no cell
 };
 
 /// Floats in a vector: rays in a packet.

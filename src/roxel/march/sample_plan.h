@@ -28,6 +28,12 @@ struct SamplePlan {
   double serves_until(int level) const {
     return level <= finest_level ? std::numeric_limits<double>::infinity() : serves_until_[level];
   }
+  /// The level whose samples serve as far as the range goes: none divides further.
+  int last_level() const {
+    int level = root_level;
+    while (level > finest_level && serves_until(level) < range.end) --level;
+    return level;
+  }
   std::vector<double> serves_until_;
 
   /// The plan whose samples are twice as wide at every depth, and so a quarter as many.

@@ -123,5 +123,17 @@ TEST(SamplePlan, CoarserServesEveryDepthWithSamplesOfTwiceTheWidth) {
     EXPECT_EQ(coarser.serves_until(level + 1), plan.serves_until(level));
 }
 
+TEST(SamplePlan, TheLastLevelServesAsFarAsTheRangeGoes) {
+  SamplePlan plan;
+  plan.finest_level = 1;
+  plan.root_level = 3;
+  plan.serves_until_ = {0, 8, 4, 2};
+  const int last_level_to[][2] = {{1, 3}, {2, 3}, {3, 2}, {4, 2}, {5, 1}, {20, 1}};
+  for (const auto& [far, last] : last_level_to) {
+    plan.range = {0.5, static_cast<double>(far)};
+    EXPECT_EQ(plan.last_level(), last) << far;
+  }
+}
+
 }  // namespace
 }  // namespace roxel
