@@ -3,10 +3,12 @@
 
 #include <Eigen/Eigenvalues>
 #include <chrono>
+#include <functional>
 
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
+#include "roxel/base/parallel.h"
 #include "roxel/base/peak_memory.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_bytes.h"
@@ -123,7 +125,7 @@ class MeshStage {
     out_.figures["fused_samples"] = field.sample_count();
     lap("mesh: fusion", 0.15);
     Extraction extraction =
-        extract_surface(field, {options_.min_views, options_.hole_size, options_.smallest_part});
+        extract_surface(field, {options_.min_views, options_.hole_size, options_.smallest_part, context_.thread_count()});
     if (extraction.surface.mesh.triangles.empty())
       throw NoSurface(input_.depth_run.string() + ": found no surface that " +
                       std::to_string(options_.min_views) +
@@ -213,9 +215,11 @@ class MeshStage {
     lap("mesh: texture", 0.8);
     const TextureFormat format =
         options_.texture == MeshTexture::kJpeg ? TextureFormat::kJpeg : TextureFormat::kPng;
-    write_surface_ply(results_ / "mesh.ply", textured_->surface);
-    write_glb(results_ / "mesh.glb", *textured_, format);
-    write_obj(results_ / "mesh.obj", *textured_, format);
+    const std::function<void()> files[] = {
+        [&] { write_obj(results_ / "mesh.obj", *textured_, format); },
+        [&] { write_glb(results_ / "mesh.glb", *textured_, format); },
+        [&] { write_surface_ply(results_ / "mesh.ply", textured_->surface); }};
+    parallel_for(std::ssize(files), context_.thread_count(), [&](std::int64_t i, int) { files[i](); });
     lap("mesh: writing", 0.9);
   }
 

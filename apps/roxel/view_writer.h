@@ -56,7 +56,7 @@ class ViewWriter {
   std::vector<ViewFigures> figures_;
   std::map<int, ImageError> errors_;         ///< by view: summed in that order, whichever is written first
   std::map<int, std::vector<Image>> sheet_;  ///< thumbnails by view
-  ExrCompression depth_compression_ = ExrCompression::kZip;
+  ExrCompression depth_compression_ = ExrCompression::kRunLength;
   double voxel_size_ = 0;             ///< 0: there is no report
   std::map<int, ReportView> report_;  ///< by view, those that the page shows
 };

@@ -24,6 +24,20 @@ inline __attribute__((always_inline)) void store(const Vector& from, Element* to
   *reinterpret_cast<Anywhere*>(to) = from;
 }
 
+/// first[lane] = from[at[lane]], second[lane] = from[at[lane] + 1].
+inline __attribute__((always_inline)) void load_pairs(const float* from, const std::int32_t at[kLanes],
+                                                      Floats& first, Floats& second) {
+  using Pairs = double __attribute__((vector_size(32)));  // only carried
+  using Pair __attribute__((aligned(4), may_alias)) = double;
+  const auto pair = [&](int lane) __attribute__((always_inline)) {
+    return *reinterpret_cast<const Pair*>(from + at[lane]);
+  };
+  const Pairs low = {pair(0), pair(1), pair(2), pair(3)}, high = {pair(4), pair(5), pair(6), pair(7)};
+  const Floats a = reinterpret_cast<Floats>(low), b = reinterpret_cast<Floats>(high);
+  first = __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14);
+  second = __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15);
+}
+
 /// rows[i][j] <-> rows[j][i].
 inline __attribute__((always_inline)) void transpose(Floats rows[kLanes]) {
   Floats a[kLanes], b[kLanes];

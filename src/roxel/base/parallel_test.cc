@@ -116,6 +116,27 @@ TEST_P(ParallelFor, RunsAsManyWorkersAsItIsTold) {
   EXPECT_TRUE(met);
 }
 
+TEST_P(ParallelFor, PreparedThingsAreVisitedInOrderAndFewAtOnce) {
+  struct Counted {
+    Counted(std::int64_t i, std::atomic<int>* counter) : index(i), alive(counter) { ++*alive; }
+    Counted(Counted&& other) noexcept : index(other.index), alive(other.alive) { ++*alive; }
+    ~Counted() { --*alive; }
+    std::int64_t index;
+    std::atomic<int>* alive;
+  };
+  std::atomic<int> alive{0};
+  std::int64_t next = 0;
+  for_each_prepared(
+      23, GetParam(), [&](std::int64_t i) { return Counted(i, &alive); },
+      [&](std::int64_t i, const Counted& thing) {
+        EXPECT_EQ(i, next++);
+        EXPECT_EQ(thing.index, i);
+        EXPECT_LE(alive, std::min(GetParam(), kMostPrepared));
+      });
+  EXPECT_EQ(next, 23);
+  EXPECT_EQ(alive, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Threads, ParallelFor, testing::Values(1, 2, 4));
 
 }  // namespace

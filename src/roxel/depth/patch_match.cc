@@ -48,19 +48,9 @@ ROXEL_KERNEL Sums sum_samples(const float* luma, int width, const Steps& s, cons
     const Ints at = iy * width + ix;
     std::int32_t offset[kLanes];
     store(at, offset);
-    float corner[4][kLanes];
-    for (int k = 0; k < kLanes; ++k) {
-      const float* p = luma + offset[k];
-      corner[0][k] = p[0];
-      corner[1][k] = p[1];
-      corner[2][k] = p[width];
-      corner[3][k] = p[width + 1];
-    }
     Floats a, b, c, d;
-    load(corner[0], a);
-    load(corner[1], b);
-    load(corner[2], c);
-    load(corner[3], d);
+    load_pairs(luma, offset, a, b);
+    load_pairs(luma + width, offset, c, d);
     const Floats top = a + fx * (b - a), bottom = c + fx * (d - c);
     const Floats sample = top + fy * (bottom - top);
     const Floats weighted = w_i * sample;
@@ -115,14 +105,15 @@ ROXEL_KERNEL float sample_cubic(const float* luma, int width, const Steps& s, co
     store((iy - 1) * width + ix - 1, offset);
     Floats value{}, gx{}, gy{};
     for (int j = 0; j < 4; ++j) {
+      FourFloats taps[kLanes];
+#pragma GCC unroll 8
+      for (int k = 0; k < kLanes; ++k) load(luma + j * width + offset[k], taps[k]);
+      Floats columns[4];
+      transpose(taps, columns);
       Floats row{}, slope{};
       for (int c = 0; c < 4; ++c) {
-        float taps[kLanes];
-        for (int k = 0; k < kLanes; ++k) taps[k] = luma[offset[k] + j * width + c];
-        Floats tap;
-        load(taps, tap);
-        row += cx.w[c] * tap;
-        slope += cx.d[c] * tap;
+        row += cx.w[c] * columns[c];
+        slope += cx.d[c] * columns[c];
       }
       value += cy.w[j] * row;
       gx += cy.w[j] * slope;
@@ -258,14 +249,12 @@ bool Patch::place(const PatchSource& source, const PixelPlane& plane, Steps& s) 
   const float r = static_cast<float>(radius_);
   const float right = static_cast<float>(source.luma->width()) - 2.5f;
   const float below = static_cast<float>(source.luma->height()) - 2.5f;
-  for (int corner = 0; corner < 4; ++corner) {
-    const float du = corner & 1 ? r : -r, dv = corner & 2 ? r : -r;
-    const float z = s.z0 + s.zu * du + s.zv * dv;
-    if (!(z > 0) || !(plane.at(du, dv) > 0)) return false;
-    const float x = (s.x0 + s.xu * du + s.xv * dv) / z - 0.5f, y = (s.y0 + s.yu * du + s.yv * dv) / z - 0.5f;
-    if (!(x >= 1.5f && y >= 1.5f && x < right && y < below)) return false;
-  }
-  return true;
+  const FourFloats du = {-r, r, -r, r}, dv = {-r, -r, r, r};  // of the corners
+  const FourFloats z = s.z0 + s.zu * du + s.zv * dv, w = plane.w + plane.wu * du + plane.wv * dv;
+  const FourFloats x = (s.x0 + s.xu * du + s.xv * dv) / z - 0.5f;
+  const FourFloats y = (s.y0 + s.yu * du + s.yv * dv) / z - 0.5f;
+  const auto inside = (z > 0) & (w > 0) & (x >= 1.5f) & (y >= 1.5f) & (x < right) & (y < below);
+  return (inside[0] & inside[1] & inside[2] & inside[3]) != 0;
 }
 
 float Patch::correlation(const PatchSource& source, const PixelPlane& plane) const {
@@ -277,8 +266,8 @@ float Patch::correlation(const PatchSource& source, const Steps& s) const {
   const Sums sums = sum_samples(source.luma->data().data(), source.luma->width(), s, du_.data(), dv_.data(),
                                 weight_.data(), value_.data(), count_);
   const double variance = std::max(0.0, static_cast<double>(sums.vv) - static_cast<double>(sums.v) * sums.v);
-  return static_cast<float>(sums.rv /
-                            std::sqrt((variance + noise_variance_) * (variance_ + noise_variance_)));
+  return sums.rv /
+         std::sqrt(static_cast<float>((variance + noise_variance_) * (variance_ + noise_variance_)));
 }
 
 Patch::Equations Patch::linearise(const PatchSource& source, const PixelPlane& plane) const {

@@ -16,7 +16,7 @@ std::filesystem::path depth_path(const std::filesystem::path& run, const std::st
 /// Writes 32-bit float EXR with channels Z, V, A, and Z.bp, V.bp, Z.refined, V.refined, N.x, N.y, N.z where
 /// present. Makes missing folders. Atomic; throws IoError.
 void write_depth(const std::filesystem::path& path, const DepthLayers& layers,
-                 ExrCompression compression = ExrCompression::kZip);
+                 ExrCompression compression = ExrCompression::kRunLength);
 
 /// Throws InvalidInput, naming the file, when it is missing, cut off, or without the channels Z, V, A.
 DepthLayers read_depth(const std::filesystem::path& path);

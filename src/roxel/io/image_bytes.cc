@@ -45,7 +45,9 @@ std::string jpeg_bytes(const Image& picture, int quality) {
 
 std::string png_bytes(const Image& picture) {
   ROXEL_CHECK(picture.channels() == 1 || picture.channels() == 3);
-  return encoded(picture, "png", {picture.width(), picture.height(), picture.channels(), OIIO::TypeUInt8});
+  OIIO::ImageSpec spec(picture.width(), picture.height(), picture.channels(), OIIO::TypeUInt8);
+  spec.attribute("png:compressionLevel", kPngCompression);
+  return encoded(picture, "png", spec);
 }
 
 }  // namespace roxel

@@ -15,6 +15,7 @@
 
 #include "roxel/base/atomic_file.h"
 #include "roxel/base/error.h"
+#include "roxel/io/image_bytes.h"
 #include "roxel/io/image_source.h"
 
 namespace roxel {
@@ -156,14 +157,23 @@ void write_with(const std::string& path, const char* format, const OIIO::ImageSp
   });
 }
 
-/// Of zlib's 1 to 9. Its default, 6, takes several times as long for files that are a few per cent smaller.
-constexpr int kPngCompression = 2;
-
 void write_png_bytes(const std::string& path, int width, int height, int channels,
                      const std::vector<std::uint8_t>& bytes) {
   OIIO::ImageSpec spec(width, height, channels, OIIO::TypeUInt8);
   spec.attribute("png:compressionLevel", kPngCompression);
   write_with(path, "png", spec, OIIO::TypeUInt8, bytes.data());
+}
+
+const char* name_of(ExrCompression compression) {
+  switch (compression) {
+    case ExrCompression::kZip:
+      return "zip:2";
+    case ExrCompression::kRunLength:
+      return "rle";
+    case ExrCompression::kNone:
+      return "none";
+  }
+  return "";
 }
 
 }  // namespace
@@ -250,7 +260,7 @@ void write_exr(const std::string& path, const std::vector<FloatChannel>& channel
     for (float& value : values) value = std::clamp(value, -kLargestHalf, kLargestHalf);
   spec.alpha_channel = -1;  // planes are numbers, not colours: nothing is multiplied by a plane called A
   spec.z_channel = -1;
-  spec.attribute("compression", compression == ExrCompression::kNone ? "none" : "zip:2");
+  spec.attribute("compression", name_of(compression));
   spec.attribute("DateTime", "1970:01:01 00:00:00");  // else it is now, and equal pixels make unequal files
   write_with(path, "openexr", spec, OIIO::TypeFloat, values.data());
 }

@@ -4,8 +4,11 @@
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
@@ -19,9 +22,9 @@ using openvdb::Coord;
 using MaskTree = openvdb::MaskTree;
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-constexpr std::int64_t kPixelsAtOnce = 32'000'000;  ///< of views that are in memory together
+constexpr std::int64_t kPixelsAtOnce = 96'000'000;  ///< of views that are in memory together
 constexpr std::int64_t kViewsShare = 4;  ///< one part in so many of the memory is theirs, if they need that
-constexpr std::int64_t kBytesPerPixel = 4 * sizeof(float);  ///< of a view that is ready
+constexpr std::int64_t kBytesPerPixel = 8;  ///< of a view that is ready
 /// Of one that is being read: the layers of its file, and what is made of them.
 constexpr std::int64_t kBytesPerPixelRead = 16 * sizeof(float);
 constexpr float kLeastCosine = 0.2f;  ///< of the angle between ray and normal: steeper depth says no less
@@ -32,15 +35,36 @@ constexpr float kLeastSupportCosine =
 constexpr double kFarthestOutline = 4;  ///< pixels
 constexpr std::int64_t kBytesPerLeaf = 7 * (Leaf::SIZE * sizeof(float) + 128);  ///< with the sums of a vote
 
-/// A view ready to be asked: per pixel distance along the axis, weight, and the cosine that turns a distance
-/// along the axis into one along the normal.
+/// What a pixel's depth counts, in four bytes.
+class Facing {
+ public:
+  Facing() = default;
+  Facing(float weight, float cosine)
+      : weight_(static_cast<std::uint16_t>((std::bit_cast<std::uint32_t>(weight) + 0x8000u) >> 16)),
+        cosine_(static_cast<std::uint16_t>(cosine * kUnit + 0.5f)) {}
+  /// To 8 bits.
+  float weight() const { return std::bit_cast<float>(static_cast<std::uint32_t>(weight_) << 16); }
+  /// That turns a distance along the axis into one along the normal.
+  float cosine() const { return static_cast<float>(cosine_) * (1 / kUnit); }
+
+ private:
+  static constexpr float kUnit = 1 << 14;  // directions are longer than 1 off the axis: so is their cosine
+  std::uint16_t weight_ = 0, cosine_ = 0;
+};
+static_assert(sizeof(float) + sizeof(Facing) == kBytesPerPixel);
+
+/// A view ready to be asked.
 struct PreparedView {
+  static constexpr float kFree = -1;  ///< the ray sees nothing in the box
+
   PinholeCamera camera;
-  Image depth, weight, scale, opacity;
+  Image depth;  ///< along the axis; kFree, or 0 where nothing is known
+  std::vector<Facing> facing;
   Eigen::Matrix<double, 3, 4> from_world;  ///< homogeneous pixel position; its z is the depth
   float continuous = 0;                    ///< neighbours whose depths differ by less lie on one surface
 
-  /// Of blocks of kBlock x kBlock pixels: the smallest depth, 0 where a pixel has none, and the largest.
+  /// Of blocks of kBlock x kBlock pixels: the smallest depth, not above 0 where a pixel has none, and the
+  /// largest.
   static constexpr int kBlock = 8;
   Image nearest = {}, farthest = {};
 
@@ -48,6 +72,10 @@ struct PreparedView {
   Vector3d project(const Vector3d& x) const {
     const Vector3d h = from_world.leftCols<3>() * x + from_world.col(3);
     return {h.x() / h.z(), h.y() / h.z(), h.z()};
+  }
+  Facing& facing_of(int x, int y) { return facing[static_cast<std::size_t>(y) * depth.width() + x]; }
+  const Facing& facing_of(int x, int y) const {
+    return facing[static_cast<std::size_t>(y) * depth.width() + x];
   }
   bool has(int x, int y) const {
     return x >= 0 && y >= 0 && x < depth.width() && y < depth.height() && *depth.pixel(x, y) > 0;
@@ -145,25 +173,20 @@ PreparedView prepare(FusionView view, const FusionOptions& options) {
   ROXEL_CHECK_EQ(width, view.camera.intrinsics.width);
   ROXEL_CHECK_EQ(height, view.camera.intrinsics.height);
   ROXEL_CHECK_EQ(view.variance.data().size(), view.depth.data().size());
-  PreparedView out{view.camera,
-                   std::move(view.depth),
-                   Image(width, height, 1),
-                   Image(width, height, 1),
-                   std::move(view.opacity),
-                   pixel_from_world(view.camera),
-                   static_cast<float>(options.band * options.voxel_size)};
+  PreparedView out{view.camera, std::move(view.depth), std::vector<Facing>(view.variance.data().size()),
+                   pixel_from_world(view.camera), static_cast<float>(options.band * options.voxel_size)};
   const float least = static_cast<float>(options.least_sigma * options.voxel_size);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      float& z = *out.depth.pixel(x, y);
-      if (!is_depth(z, *view.variance.pixel(x, y))) z = 0;
-    }
+  for (std::size_t i = 0; i < out.facing.size(); ++i) {
+    float& z = out.depth.data()[i];
+    if (is_depth(z, view.variance.data()[i])) continue;
+    const float opacity = view.opacity.empty() ? 1.0f : view.opacity.data()[i];
+    z = opacity < options.free_opacity ? PreparedView::kFree : 0.0f;
+  }
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       if (!out.has(x, y)) continue;
-      const float scale = axis_to_normal(out, view.normal, x, y);
-      *out.scale.pixel(x, y) = scale;
-      *out.weight.pixel(x, y) = 1 / (scale * scale * *view.variance.pixel(x, y) + least * least);
+      const float cosine = axis_to_normal(out, view.normal, x, y);
+      out.facing_of(x, y) = {1 / (cosine * cosine * *view.variance.pixel(x, y) + least * least), cosine};
     }
   summarise_blocks(out);
   return out;
@@ -225,7 +248,6 @@ class Voting {
  public:
   explicit Voting(const FusionOptions& options)
       : band_(static_cast<float>(options.band * options.voxel_size)),
-        free_opacity_(options.free_opacity),
         support_(static_cast<float>(kSupport * options.voxel_size)),
         voxel_size_(options.voxel_size),
         free_weight_(static_cast<float>(1 / (options.voxel_size * options.voxel_size))) {}
@@ -238,11 +260,11 @@ class Voting {
     const int px = static_cast<int>(uvz.x()), py = static_cast<int>(uvz.y());
     if (!view.has(px, py)) return without_depth(view, uvz);
     const float z = depth_at(view, uvz.x(), uvz.y());
-    const float along = z - static_cast<float>(uvz.z()), scale = *view.scale.pixel(px, py);
+    const float along = z - static_cast<float>(uvz.z()), scale = view.facing_of(px, py).cosine();
     if (along < -band_) return {};  // hidden; not by the normal, or outlines would throw long shadows
     const float distance = along * scale;
     if (distance >= band_ && beside_surface(view, uvz)) return {};
-    return {std::min(distance, band_), *view.weight.pixel(px, py) * scale * behind(along),
+    return {std::min(distance, band_), view.facing_of(px, py).weight() * scale * behind(along),
             std::abs(along) * std::max(scale, kLeastSupportCosine) < support_};
   }
 
@@ -260,10 +282,8 @@ class Voting {
   }
 
   Vote without_depth(const PreparedView& view, const Vector3d& uvz) const {
-    const float opacity = view.opacity.empty()
-                              ? 1.0f
-                              : *view.opacity.pixel(static_cast<int>(uvz.x()), static_cast<int>(uvz.y()));
-    if (!(opacity < free_opacity_) || beside_surface(view, uvz)) return {};
+    const bool free = *view.depth.pixel(static_cast<int>(uvz.x()), static_cast<int>(uvz.y())) < 0;
+    if (!free || beside_surface(view, uvz)) return {};
     return {band_, free_weight_, false};
   }
 
@@ -273,7 +293,7 @@ class Voting {
     return distance > flat ? 1.0f : (distance + band_) / (flat + band_);
   }
 
-  float band_, free_opacity_, support_;
+  float band_, support_;
   double voxel_size_;
   float free_weight_;
 };
@@ -420,19 +440,24 @@ class Fusion {
     const Vector3d corner = voxels_->position(distance.origin());
     const Vector3d middle = corner + Vector3d::Constant(kMiddle * voxels_->voxel_size);
     const double radius = std::sqrt(3.0) * kMiddle * voxels_->voxel_size;
-    std::vector<const PreparedView*> speaking;
-    for (const PreparedView& view : batch)
-      if (may_say(view, middle, radius, voxels_->band)) speaking.push_back(&view);
-    for (auto it = distance.cbeginValueOn(); it; ++it) {
-      const Vector3d x = voxels_->position(it.getCoord());
-      const auto n = it.pos();
-      for (const PreparedView* view : speaking) {
-        const Vote said = vote(*view, x);
-        distances[n] += said.weight * said.distance;
-        weights[n] += said.weight;
-        counts[n] += said.near;
+    struct Place {
+      openvdb::Index n;
+      Vector3d x;
+    };
+    std::array<Place, Leaf::SIZE> places;
+    std::size_t count = 0;
+    for (auto it = distance.cbeginValueOn(); it; ++it)
+      places[count++] = {it.pos(), voxels_->position(it.getCoord())};
+    // View by view: what a view shows of a leaf is close together.
+    for (const PreparedView& view : batch) {
+      if (!may_say(view, middle, radius, voxels_->band)) continue;
+      for (const Place& place : std::span(places).first(count)) {
+        const Vote said = vote(view, place.x);
+        distances[place.n] += said.weight * said.distance;
+        weights[place.n] += said.weight;
+        counts[place.n] += said.near;
         if (said.weight > 0 && said.distance < static_cast<float>(voxels_->band))
-          spread.add(n, said.weight, said.distance);
+          spread.add(place.n, said.weight, said.distance);
       }
     }
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "roxel/base/error.h"
 
@@ -80,28 +81,37 @@ Surface kept_triangles(const Surface& surface, const std::vector<std::uint8_t>& 
   return kept;
 }
 
-std::vector<std::array<std::int32_t, 3>> face_neighbours(const Mesh& mesh) {
+FaceNeighbours face_neighbours(const Mesh& mesh) {
   struct Side {
-    std::uint32_t low, high;
+    std::uint32_t high;
     std::int32_t face, edge;
   };
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh.triangles.size());
-  for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
-    for (int k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax(mesh.triangles[f][k], mesh.triangles[f][(k + 1) % 3]);
-      sides.push_back({low, high, static_cast<std::int32_t>(f), k});
+  // By their lower corner, of which each has few: by counting.
+  std::vector<std::uint32_t> first(mesh.points.size() + 1);
+  const auto for_each_side = [&](const auto& visit) {
+    for (std::size_t f = 0; f < mesh.triangles.size(); ++f)
+      for (int k = 0; k < 3; ++k) {
+        const auto [low, high] = std::minmax(mesh.triangles[f][k], mesh.triangles[f][(k + 1) % 3]);
+        visit(low, Side{high, static_cast<std::int32_t>(f), k});
+      }
+  };
+  for_each_side([&](std::uint32_t low, const Side&) { ++first[low + 1]; });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<Side> sides(3 * mesh.triangles.size());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for_each_side([&](std::uint32_t low, const Side& side) { sides[next[low]++] = side; });
+  FaceNeighbours neighbours(mesh.triangles.size(), {-1, -1, -1});
+  for (std::size_t low = 0; low < mesh.points.size(); ++low) {
+    const std::span of_low(sides.begin() + first[low], sides.begin() + first[low + 1]);
+    std::stable_sort(of_low.begin(), of_low.end(),
+                     [](const Side& a, const Side& b) { return a.high < b.high; });
+    for (std::size_t i = 0; i + 1 < of_low.size(); ++i) {
+      const Side &a = of_low[i], &b = of_low[i + 1];
+      if (a.high != b.high || a.face == b.face) continue;
+      neighbours[a.face][a.edge] = b.face;
+      neighbours[b.face][b.edge] = a.face;
+      ++i;
     }
-  std::stable_sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return a.low != b.low ? a.low < b.low : a.high < b.high;
-  });
-  std::vector<std::array<std::int32_t, 3>> neighbours(mesh.triangles.size(), {-1, -1, -1});
-  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
-    const Side &a = sides[i], &b = sides[i + 1];
-    if (a.low != b.low || a.high != b.high || a.face == b.face) continue;
-    neighbours[a.face][a.edge] = b.face;
-    neighbours[b.face][b.edge] = a.face;
-    ++i;
   }
   return neighbours;
 }

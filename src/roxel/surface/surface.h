@@ -23,7 +23,8 @@ Surface kept_triangles(const Surface& surface, const std::vector<std::uint8_t>& 
 
 /// Up to three triangles that share an edge with a triangle, -1 where there is none; entry k is over the edge
 /// from corner k to corner k + 1. Where more than two share an edge, they are joined in pairs.
-std::vector<std::array<std::int32_t, 3>> face_neighbours(const Mesh& mesh);
+using FaceNeighbours = std::vector<std::array<std::int32_t, 3>>;
+FaceNeighbours face_neighbours(const Mesh& mesh);
 
 /// Parts of a surface that hang together by points, numbered in the order of their first triangles.
 struct Components {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "roxel/base/parallel.h"
 #include "roxel/surface/distance_voxels.inl"
 #include "roxel/surface/manifold.h"
 
@@ -139,13 +140,13 @@ std::int64_t drop_small_parts(const LatticeMesh& mesh, const Mesh& topology, dou
 
 /// Adds what closes small holes: weak pieces all of whose edges lie on kept surface. Returns how many
 /// triangles.
-std::int64_t close_holes(const LatticeMesh& mesh, const Mesh& topology, const std::vector<Support>& support,
-                         double hole_size, std::vector<std::uint8_t>& keep) {
+std::int64_t close_holes(const LatticeMesh& mesh, const Mesh& topology, const FaceNeighbours& neighbours,
+                         const std::vector<Support>& support, double hole_size,
+                         std::vector<std::uint8_t>& keep) {
   std::vector<std::uint8_t> weak(keep.size());
   for (std::size_t t = 0; t < keep.size(); ++t) weak[t] = !keep[t] && support[t] != Support::kNone;
   const Components pieces = connected_components(topology, weak);
   std::vector<double> sides = extents(mesh, pieces);
-  const auto neighbours = face_neighbours(topology);
   std::vector<std::uint8_t> rimmed(
       pieces.count);  // a closed piece that touches nothing is no hole, but debris
   for (std::size_t t = 0; t < keep.size(); ++t) {
@@ -203,13 +204,13 @@ class Interpolated {
 /// Moves points along the surface towards the middle of their neighbours, and back onto it: those of the dual
 /// method lie anywhere in their cells, and its triangles are slivers where the surface passes close to a
 /// corner of the lattice. Points at open edges stay.
-void relax(const DistanceField::Voxels& voxels, const Mesh& topology, LatticeMesh& mesh) {
+void relax(const DistanceField::Voxels& voxels, const FaceNeighbours& neighbours, int threads,
+           LatticeMesh& mesh) {
+  constexpr std::int64_t kGrain = 1 << 13;
   std::vector<std::uint8_t> fixed(mesh.points.size());
-  const auto neighbours = face_neighbours(topology);
   for (std::size_t t = 0; t < neighbours.size(); ++t)
     for (int k = 0; k < 3; ++k)
       if (neighbours[t][k] < 0) fixed[mesh.triangles[t][k]] = fixed[mesh.triangles[t][(k + 1) % 3]] = 1;
-  const Interpolated field(voxels);
   std::vector<openvdb::Vec3s> sum(mesh.points.size());
   std::vector<int> count(mesh.points.size());
   for (int round = 0; round < kRelaxRounds; ++round) {
@@ -220,15 +221,18 @@ void relax(const DistanceField::Voxels& voxels, const Mesh& topology, LatticeMes
         sum[t[k]] += mesh.points[t[(k + 1) % 3]] + mesh.points[t[(k + 2) % 3]];
         count[t[k]] += 2;
       }
-    for (std::size_t i = 0; i < sum.size(); ++i) {
-      if (fixed[i] || count[i] == 0) continue;
-      const openvdb::Vec3s from = mesh.points[i];
-      openvdb::Vec3s to = from + kRelaxStep * (sum[i] / static_cast<float>(count[i]) - from);
-      const auto there = field(to);
-      if (!there || there->gradient.lengthSqr() < kLeastGradient * kLeastGradient) continue;
-      to -= there->distance / there->gradient.lengthSqr() * there->gradient;
-      if ((to - from).lengthSqr() < kFarthestMove * kFarthestMove) mesh.points[i] = to;
-    }
+    parallel_for_blocks(std::ssize(sum), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
+      const Interpolated field(voxels);
+      for (std::int64_t i = begin; i < end; ++i) {
+        if (fixed[i] || count[i] == 0) continue;
+        const openvdb::Vec3s from = mesh.points[i];
+        openvdb::Vec3s to = from + kRelaxStep * (sum[i] / static_cast<float>(count[i]) - from);
+        const auto there = field(to);
+        if (!there || there->gradient.lengthSqr() < kLeastGradient * kLeastGradient) continue;
+        to -= there->distance / there->gradient.lengthSqr() * there->gradient;
+        if ((to - from).lengthSqr() < kFarthestMove * kFarthestMove) mesh.points[i] = to;
+      }
+    });
   }
 }
 
@@ -245,9 +249,10 @@ Extraction extract_surface(const DistanceField& field, const ExtractionOptions& 
   for (std::size_t t = 0; t < keep.size(); ++t) keep[t] = support[t] == Support::kStrong;
   out.unsupported = std::count(keep.begin(), keep.end(), 0);
   out.debris = drop_small_parts(mesh, whole.mesh, options.smallest_part, keep);
-  out.closed = close_holes(mesh, whole.mesh, support, options.hole_size, keep);
+  const FaceNeighbours neighbours = face_neighbours(whole.mesh);
+  out.closed = close_holes(mesh, whole.mesh, neighbours, support, options.hole_size, keep);
   out.unsupported -= out.closed;
-  relax(voxels, whole.mesh, mesh);
+  relax(voxels, neighbours, options.threads, mesh);
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     const openvdb::Vec3s& p = mesh.points[i];
     whole.mesh.points[i] = voxels.origin + voxels.voxel_size * Vector3d(p.x(), p.y(), p.z());

@@ -11,6 +11,7 @@ struct ExtractionOptions {
   double hole_size = 12;      ///< extent of what is closed though nobody saw it, where it is surrounded by
                               ///< surface that was seen; lattice steps, 0 = nothing
   double smallest_part = 16;  ///< connected parts of less extent are left out; lattice steps
+  int threads = 1;            ///< changes no result
 };
 
 struct Extraction {

@@ -26,14 +26,13 @@ struct Chart {
   Eigen::AlignedBox2d box;  ///< of their pixels in the view
 };
 
-Image display_values(const Image& linear, const Rgb& gain) {
-  Image out = linear;
-  for (std::size_t i = 0; i < out.data().size(); ++i)
-    out.data()[i] = srgb_encode(std::clamp(gain[i % 3] * out.data()[i], 0.0f, 1.0f));
-  return out;
+/// From linear to display values.
+void encode_for_display(const Rgb& gain, Image& rgb) {
+  for (std::size_t i = 0; i < rgb.data().size(); ++i)
+    rgb.data()[i] = srgb_encode(std::clamp(gain[i % 3] * rgb.data()[i], 0.0f, 1.0f));
 }
 
-std::vector<Chart> find_charts(const std::vector<std::array<std::int32_t, 3>>& neighbours,
+std::vector<Chart> find_charts(const FaceNeighbours& neighbours,
                                const std::vector<int>& labels) {
   std::vector<Chart> charts;
   std::vector<std::uint8_t> taken(labels.size());
@@ -139,12 +138,21 @@ class Texturing {
   /// Calls visit(v, camera, display values) for every view that has charts, in order.
   template <class Visit>
   void for_each_view(const Visit& visit) {
-    for (int v = 0; v < view_count_; ++v) {
+    std::vector<std::uint8_t> has_charts(view_count_);
+    for (const Chart& chart : charts_)
+      if (chart.view != kNoView) has_charts[chart.view] = 1;
+    std::vector<int> wanted;
+    for (int v = 0; v < view_count_; ++v)
+      if (has_charts[v]) wanted.push_back(v);
+    const auto shown = [&](std::int64_t i) {
       context_.throw_if_cancelled();
-      if (std::none_of(charts_.begin(), charts_.end(), [&](const Chart& c) { return c.view == v; })) continue;
-      const TextureView view = load_(v);
-      visit(v, view.camera, display_values(view.rgb, out_.gains[v]));
-    }
+      TextureView view = load_(wanted[i]);
+      encode_for_display(out_.gains[wanted[i]], view.rgb);
+      return view;
+    };
+    for_each_prepared(
+        std::ssize(wanted), context_.thread_count(), shown,
+        [&](std::int64_t i, const TextureView& view) { visit(wanted[i], view.camera, view.rgb); });
   }
 
   void place_charts() {
@@ -341,7 +349,7 @@ class Texturing {
   RunContext& context_;
   MeshRays rays_;
   TexturedSurface out_;
-  std::vector<std::array<std::int32_t, 3>> neighbours_;
+  FaceNeighbours neighbours_;
   std::vector<int> labels_;
   std::vector<Chart> charts_;
   std::vector<PinholeCamera> cameras_;

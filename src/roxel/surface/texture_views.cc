@@ -102,6 +102,18 @@ TextureView checked(TextureView view) {
   return view;
 }
 
+/// Calls visit(v, view) for all views in order.
+template <class Visit>
+void for_each_view(int view_count, const TextureViewLoader& load, const RunContext& context,
+                   const Visit& visit) {
+  const auto loaded = [&](std::int64_t v) {
+    context.throw_if_cancelled();
+    return checked(load(static_cast<int>(v)));
+  };
+  for_each_prepared(view_count, context.thread_count(), loaded,
+                    [&](std::int64_t v, const TextureView& view) { visit(static_cast<int>(v), view); });
+}
+
 Rgb mean_color(const Surface& surface, std::size_t face) {
   Rgb mean{};
   for (const std::uint32_t corner : surface.mesh.triangles[face])
@@ -130,9 +142,7 @@ std::vector<std::vector<FaceView>> face_views(const Mesh& mesh, const MeshRays& 
                                               const TextureViewLoader& load, const SightOptions& options,
                                               RunContext& context) {
   std::vector<std::vector<FaceView>> out(mesh.triangles.size());
-  for (int v = 0; v < view_count; ++v) {
-    context.throw_if_cancelled();
-    const TextureView view = checked(load(v));
+  for_each_view(view_count, load, context, [&](int v, const TextureView& view) {
     const Onlooker onlooker(view, rays, options);
     parallel_for_blocks(std::ssize(out), kTextureGrain, context.thread_count(),
                         [&](std::int64_t begin, std::int64_t end, int) {
@@ -142,7 +152,7 @@ std::vector<std::vector<FaceView>> face_views(const Mesh& mesh, const MeshRays& 
                               out[f].push_back(*seen);
                             }
                         });
-  }
+  });
   return out;
 }
 
@@ -153,9 +163,7 @@ std::vector<Rgb> photograph_colors(const Surface& surface, const MeshRays& rays,
   const std::size_t count = surface.mesh.points.size();
   std::vector<Rgb> sums(count, Rgb{});
   std::vector<float> weights(count);
-  for (int v = 0; v < view_count; ++v) {
-    context.throw_if_cancelled();
-    const TextureView view = checked(load(v));
+  for_each_view(view_count, load, context, [&](int v, const TextureView& view) {
     const Onlooker onlooker(view, rays, options);
     parallel_for_blocks(std::ssize(sums), kTextureGrain, context.thread_count(),
                         [&](std::int64_t begin, std::int64_t end, int) {
@@ -172,7 +180,7 @@ std::vector<Rgb> photograph_colors(const Surface& surface, const MeshRays& rays,
                             weights[i] += weight;
                           }
                         });
-  }
+  });
   for (std::size_t i = 0; i < count; ++i)
     for (int c = 0; c < 3; ++c) sums[i][c] = weights[i] > 0 ? sums[i][c] / weights[i] : fallback[i][c];
   return sums;

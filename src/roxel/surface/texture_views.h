@@ -21,7 +21,7 @@ struct TextureView {
   Mask usable = {};  ///< 0 where the object is not shown; empty = everywhere
 };
 
-/// The view of that number; called several times for every view, one view at a time.
+/// The view of that number; called several times for every view, from any thread.
 using TextureViewLoader = std::function<TextureView(int view_idx)>;
 
 /// One view of one triangle.

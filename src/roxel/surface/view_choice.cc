@@ -57,7 +57,7 @@ std::vector<std::uint8_t> outliers(const std::vector<Rgb>& gains, const Rgb* can
 /// around it.
 using Flags = std::vector<std::vector<std::uint8_t>>;
 Flags of_most(const Flags& flags, const std::vector<std::vector<FaceView>>& views,
-              const std::vector<std::array<std::int32_t, 3>>& neighbours, int threads) {
+              const FaceNeighbours& neighbours, int threads) {
   Flags out = flags;
   parallel_for_blocks(
       std::ssize(flags), kChoiceGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
@@ -102,7 +102,7 @@ struct Choices {
 
 class Labelling {
  public:
-  Labelling(const std::vector<std::array<std::int32_t, 3>>& neighbours,
+  Labelling(const FaceNeighbours& neighbours,
             const std::vector<std::vector<FaceView>>& views, const ViewChoiceOptions& options)
       : neighbours_(neighbours), seam_(static_cast<float>(options.seam_cost)), threads_(options.threads) {
     for (const auto& of_face : views) choices_.emplace_back(of_face);
@@ -193,7 +193,7 @@ class Labelling {
     return changed;
   }
 
-  const std::vector<std::array<std::int32_t, 3>>& neighbours_;
+  const FaceNeighbours& neighbours_;
   float seam_;
   int threads_;
   std::vector<Choices> choices_;
@@ -217,7 +217,7 @@ void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads) {
       });
 }
 
-std::int64_t drop_transients(const std::vector<std::array<std::int32_t, 3>>& neighbours,
+std::int64_t drop_transients(const FaceNeighbours& neighbours,
                              const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
                              const ViewChoiceOptions& options, std::vector<std::vector<FaceView>>& views) {
   Flags flags(views.size());
@@ -241,7 +241,7 @@ std::int64_t drop_transients(const std::vector<std::array<std::int32_t, 3>>& nei
   return dropped;
 }
 
-std::vector<int> choose_views(const std::vector<std::array<std::int32_t, 3>>& neighbours,
+std::vector<int> choose_views(const FaceNeighbours& neighbours,
                               const std::vector<std::vector<FaceView>>& views,
                               const ViewChoiceOptions& options) {
   return Labelling(neighbours, views, options).solve();
