@@ -124,8 +124,8 @@ class MeshStage {
     const DistanceField field = fused(load, fusion);
     out_.figures["fused_samples"] = field.sample_count();
     lap("mesh: fusion", 0.15);
-    Extraction extraction =
-        extract_surface(field, {options_.min_views, options_.hole_size, options_.smallest_part, context_.thread_count()});
+    Extraction extraction = extract_surface(
+        field, {options_.min_views, options_.hole_size, options_.smallest_part, context_.thread_count()});
     if (extraction.surface.mesh.triangles.empty())
       throw NoSurface(input_.depth_run.string() + ": found no surface that " +
                       std::to_string(options_.min_views) +

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <thread>
 
 #include "roxel/base/error.h"
 #include "roxel/base/kernel.h"
+#include "roxel/base/lanes.h"
 #include "roxel/base/parallel.h"
 
 namespace roxel {
@@ -17,25 +19,41 @@ namespace {
 constexpr float kLargestColor = 1023.0f;
 constexpr float kLargestOpacitySum = 1 << 20;
 
+/// The first eight of the nine sums of colours, as they follow one another in VoxelScratch (from `mean`) and
+/// in ColorTotals (from the second): x, y, z, xx, yy, zz, xy, xz. The ninth, yz, goes beside them.
+using EightSums = double __attribute__((vector_size(64)));
+using EightTotals = std::int64_t __attribute__((vector_size(64)));
 static_assert(sizeof(VoxelColor) == 10 * sizeof(float), "as the first ten numbers of VoxelScratch");
+
+constexpr double kLargestMoment = kLargestColor * kLargestColor;
+constexpr EightSums kLargestSums = {kLargestColor,  kLargestColor,  kLargestColor,  kLargestMoment,
+                                    kLargestMoment, kLargestMoment, kLargestMoment, kLargestMoment};
 
 /// The nearest whole number of value * unit, below 2^51. What is added leaves no room for fractions: as plain
 /// arithmetic it vectorises.
+constexpr double kNoFractions = 0x1.8p52;
 inline __attribute__((always_inline)) std::int64_t fixed(double value, double unit) {
-  constexpr double kNoFractions = 0x1.8p52;
   return std::bit_cast<std::int64_t>(value * unit + kNoFractions) - std::bit_cast<std::int64_t>(kNoFractions);
 }
 
+struct CappedColor {
+  std::int64_t weight, yz;
+  EightTotals sums;
+};
+
 /// capped_color of a voxel with evidence.
-inline __attribute__((always_inline)) void cap_color(const VoxelScratch& voxel, ColorTotals& totals) {
+inline __attribute__((always_inline)) void cap_color(const VoxelScratch& voxel, CappedColor& capped) {
   const double weight = voxel.evidence;
   const double scale = std::min(1.0, weight) / weight;
-  totals[0] = fixed(weight * scale, kColorUnit);
-  const auto bounded = [scale](float sum, double limit) {
-    return fixed(std::clamp(sum * scale, -limit, limit), kColorUnit);
-  };
-  for (int c = 0; c < 3; ++c) totals[1 + c] = bounded(voxel.mean[c], kLargestColor);
-  for (int c = 0; c < 6; ++c) totals[4 + c] = bounded(voxel.cov[c], kLargestColor * kLargestColor);
+  Floats stored;
+  load(voxel.mean, stored);
+  EightSums sums = __builtin_convertvector(stored, EightSums) * scale;
+  sums = sums > kLargestSums ? kLargestSums : sums;
+  sums = sums < -kLargestSums ? -kLargestSums : sums;
+  capped.weight = fixed(weight * scale, kColorUnit);
+  capped.yz = fixed(std::clamp(voxel.cov[5] * scale, -kLargestMoment, kLargestMoment), kColorUnit);
+  capped.sums = reinterpret_cast<EightTotals>(sums * kColorUnit + kNoFractions) -
+                std::bit_cast<std::int64_t>(kNoFractions);
 }
 
 /// Whether no principal minor of the covariance (xx, yy, zz, xy, xz, yz) is negative.
@@ -55,37 +73,45 @@ void make_semi_definite(double moment, double s[6]) {
   if (!semi_definite(s)) s[3] = s[4] = s[5] = 0;
 }
 
-inline __attribute__((always_inline)) void color_of_sums(const ColorTotals& totals, float mean[3],
-                                                         float cov[6], float& weight) {
-  weight = static_cast<float>(totals[0] / kColorUnit);
-  if (totals[0] <= 0) {
-    std::fill(mean, mean + 3, 0.0f);
-    std::fill(cov, cov + 6, 0.0f);
-    weight = 0;
+/// Mean, covariance and weight of fixed-point sums, to ten numbers in the order of VoxelColor.
+inline __attribute__((always_inline)) void color_of_sums(std::int64_t weight, const EightTotals& totals,
+                                                         std::int64_t yz, float color[10]) {
+  if (weight <= 0) {
+    std::fill(color, color + 10, 0.0f);
     return;
   }
-  const double inverse = 1.0 / static_cast<double>(totals[0]);
-  double m[3], s[6];
-  for (int c = 0; c < 3; ++c) m[c] = totals[1 + c] * inverse;
-  for (int c = 0; c < 6; ++c) s[c] = totals[4 + c] * inverse;
-  s[0] = std::max(0.0, s[0] - m[0] * m[0]);
-  s[1] = std::max(0.0, s[1] - m[1] * m[1]);
-  s[2] = std::max(0.0, s[2] - m[2] * m[2]);
-  s[3] -= m[0] * m[1];
-  s[4] -= m[0] * m[2];
-  s[5] -= m[1] * m[2];
-  make_semi_definite(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + s[0] + s[1] + s[2], s);
-  for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(m[c]);
-  for (int c = 0; c < 6; ++c) cov[c] = static_cast<float>(s[c]);
+  const double inverse = 1.0 / static_cast<double>(weight);
+  const EightSums moments = __builtin_convertvector(totals, EightSums) * inverse;
+  const EightSums left = __builtin_shufflevector(moments, moments, 0, 1, 2, 0, 1, 2, 0, 0);
+  const EightSums right = __builtin_shufflevector(moments, moments, 0, 1, 2, 0, 1, 2, 1, 2);
+  constexpr EightSums kCentral = {0, 0, 0, 1, 1, 1, 1, 1};
+  EightSums central = moments - kCentral * left * right;
+  constexpr EightSums kAny = {-1e300, -1e300, -1e300, 0, 0, 0, -1e300, -1e300};
+  central = central < kAny ? kAny : central;  // variances are not negative
+  double s[6] = {central[3], central[4], central[5],
+                 central[6], central[7], static_cast<double>(yz) * inverse - moments[1] * moments[2]};
+  if (!semi_definite(s)) {
+    const double moment = moments[0] * moments[0] + moments[1] * moments[1] + moments[2] * moments[2];
+    make_semi_definite(moment + s[0] + s[1] + s[2], s);
+    central = EightSums{moments[0], moments[1], moments[2], s[0], s[1], s[2], s[3], s[4]};
+  }
+  store(__builtin_convertvector(central, Floats), color);
+  color[8] = static_cast<float>(s[5]);
+  color[9] = static_cast<float>(static_cast<double>(weight) / kColorUnit);
 }
 
 /// Adds the capped colours of a brick's voxels to their totals.
 ROXEL_KERNEL void add_colors(const VoxelScratch* voxels, std::uint32_t count, ColorTotals* totals) {
   for (std::uint32_t i = 0; i < count; ++i) {
     if (voxels[i].evidence <= 0) continue;
-    ColorTotals own;
+    CappedColor own;
     cap_color(voxels[i], own);
-    for (int c = 0; c < 10; ++c) totals[i][c] += own[c];
+    std::int64_t* const to = totals[i].data();
+    EightTotals sums;
+    load(to + 1, sums);
+    store(sums + own.sums, to + 1);
+    to[0] += own.weight;
+    to[9] += own.yz;
   }
 }
 
@@ -98,16 +124,54 @@ ROXEL_KERNEL void add_opacities(const VoxelScratch* voxels, std::uint32_t count,
 }
 
 ROXEL_KERNEL void make_colors(const ColorTotals* totals, std::int64_t count, VoxelColor* colors) {
-  for (std::int64_t i = 0; i < count; ++i)
-    color_of_sums(totals[i], colors[i].mean, colors[i].cov, colors[i].evidence);
+  for (std::int64_t i = 0; i < count; ++i) {
+    EightTotals sums;
+    load(totals[i].data() + 1, sums);
+    color_of_sums(totals[i][0], sums, totals[i][9], colors[i].mean);
+  }
 }
 
-/// Turns a voxel's own sums into what the other nodes say: the totals less the voxel's own.
-ROXEL_KERNEL void leave_out_own(const ColorTotals& totals, VoxelScratch& voxel) {
-  ColorTotals others, own;
+/// Makes a voxel hold what the other nodes say: the totals less its own sums.
+inline __attribute__((always_inline)) void leave_out(const ColorTotals& totals, VoxelScratch& voxel) {
+  CappedColor own;
   cap_color(voxel, own);
-  for (int c = 0; c < 10; ++c) others[c] = totals[c] - own[c];
-  color_of_sums(others, voxel.mean, voxel.cov, voxel.evidence);
+  EightTotals sums;
+  load(totals.data() + 1, sums);
+  color_of_sums(totals[0] - own.weight, sums - own.sums, totals[9] - own.yz, voxel.mean);
+}
+
+ROXEL_KERNEL void leave_out_own(const ColorTotals& totals, VoxelScratch& voxel) { leave_out(totals, voxel); }
+
+/// The same of the entries' voxels, whose sums the entries are.
+ROXEL_KERNEL void leave_out_entries(const ColorTotals* totals, const OwnColors::Entry* entries,
+                                    std::uint32_t count, VoxelScratch* voxels) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t slot = entries[i].slot;
+    Floats low;
+    load(entries[i].color.mean, low);
+    store(low, voxels[slot].mean);
+    voxels[slot].cov[5] = entries[i].color.cov[5];
+    voxels[slot].evidence = entries[i].color.evidence;
+    leave_out(totals[slot], voxels[slot]);
+  }
+}
+
+/// Sets voxels up that hold no sums yet: their tau, and `colors`, unless null.
+ROXEL_KERNEL void set_up(const float* tau, const VoxelColor* colors, std::uint32_t count,
+                         VoxelScratch* voxels) {
+  static_assert(offsetof(VoxelScratch, evidence) == 9 * sizeof(float) &&
+                offsetof(VoxelScratch, tau) == 10 * sizeof(float));
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Floats low{}, high{};
+    if (colors) {
+      load(colors[i].mean, low);
+      high[0] = colors[i].cov[5];
+      high[1] = colors[i].evidence;
+    }
+    high[2] = tau[i];
+    store(low, voxels[i].mean);
+    store(high, voxels[i].mean + kLanes);
+  }
 }
 
 template <class Visit>
@@ -130,17 +194,16 @@ void NodeScratch::set_up_brick(std::uint32_t number) {
   entered_[number] = 1;
   order_.push_back(number);
   const Brick& brick = stack_->brick(number);
-  for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count; ++slot) {
-    VoxelScratch& voxel = voxels_[slot];
-    voxel = VoxelScratch{};
-    voxel.tau = tau_[slot];
-    if (totals_) look_up(slot, voxel);
-  }
+  const std::uint32_t first = brick.first_slot;
+  set_up(tau_ + first, colors_ ? colors_ + first : nullptr, brick.count, &voxels_[first]);
+  if (totals_ && !colors_)
+    for (std::uint32_t slot = first; slot < first + brick.count; ++slot) look_up(slot, voxels_[slot]);
 }
 
 void NodeScratch::look_up(std::uint32_t slot, VoxelScratch& voxel) const {
-  if (!colors_) return color_of(totals_[slot], voxel.mean, voxel.cov, voxel.evidence);
-  std::memcpy(static_cast<void*>(&voxel), &colors_[slot], sizeof(VoxelColor));
+  VoxelColor color;
+  if (!colors_) make_colors(&totals_[slot], 1, &color);
+  std::memcpy(static_cast<void*>(&voxel), colors_ ? &colors_[slot] : &color, sizeof(VoxelColor));
 }
 
 OwnColors::Entry OwnColors::Entry::of(std::uint32_t slot, const VoxelScratch& voxel) {
@@ -172,11 +235,8 @@ void NodeScratch::compare_with(const std::vector<ColorTotals>& totals, const std
   const OwnColors::Entry* entry = own.entries.data();
   for (const OwnColors::BrickPart& part : own.bricks) {
     enter(part.brick);
-    for (std::uint32_t i = 0; i < part.count; ++i, ++entry) {
-      VoxelScratch& voxel = voxels_[entry->slot];
-      std::memcpy(static_cast<void*>(&voxel), &entry->color, sizeof(VoxelColor));
-      leave_out_own(totals_[entry->slot], voxel);
-    }
+    leave_out_entries(totals_, entry, part.count, voxels_.get());
+    entry += part.count;
   }
 }
 
@@ -196,7 +256,7 @@ void NodeScratch::reset(const LatticeStack& stack, const std::vector<float>& tau
 
 ColorTotals capped_color(const VoxelScratch& voxel) {
   ColorTotals totals{};
-  if (voxel.evidence > 0) cap_color(voxel, totals);
+  add_colors(&voxel, 1, &totals);
   return totals;
 }
 

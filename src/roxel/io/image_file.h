@@ -56,8 +56,8 @@ struct FloatChannel {
 enum class ExrPrecision { kFloat, kHalf };
 
 /// What a file gains by it, and what it costs. Of depth maps, whose last bits are noise,
-/// run lengths leave a fifth more and take far less time. kNone is for files that are soon read again and go, or are written
-/// anew.
+/// run lengths leave a fifth more and take far less time. kNone is for files that are soon read again and go,
+/// or are written anew.
 enum class ExrCompression { kZip, kRunLength, kNone };
 
 /// All planes of one size, at least one; names are unique.

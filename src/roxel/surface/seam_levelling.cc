@@ -15,8 +15,8 @@ constexpr double kAnchor = 1e-4;  ///< keeps the mean where it is
 
 /// Calls visit(f, k, g) for every edge k of a triangle f over which another view's triangle g lies.
 template <class Visit>
-void for_each_seam_side(const FaceNeighbours& neighbours,
-                        const std::vector<int>& labels, const Visit& visit) {
+void for_each_seam_side(const FaceNeighbours& neighbours, const std::vector<int>& labels,
+                        const Visit& visit) {
   for (std::size_t f = 0; f < labels.size(); ++f)
     for (int k = 0; k < 3; ++k) {
       const std::int32_t g = neighbours[f][k];
@@ -56,8 +56,8 @@ ChartPoints chart_points(const Mesh& mesh, const std::vector<int>& labels) {
   return points;
 }
 
-std::vector<Seam> seams(const Mesh& mesh, const FaceNeighbours& neighbours,
-                        const std::vector<int>& labels, const ChartPoints& points) {
+std::vector<Seam> seams(const Mesh& mesh, const FaceNeighbours& neighbours, const std::vector<int>& labels,
+                        const ChartPoints& points) {
   std::vector<Seam> out;
   for_each_seam_side(neighbours, labels, [&](std::size_t f, int k, std::int32_t g) {
     if (static_cast<std::size_t>(g) < f) return;
@@ -67,8 +67,8 @@ std::vector<Seam> seams(const Mesh& mesh, const FaceNeighbours& neighbours,
   return out;
 }
 
-SeamColors::SeamColors(const Mesh& mesh, const FaceNeighbours& neighbours,
-                       const std::vector<int>& labels, const ChartPoints& points)
+SeamColors::SeamColors(const Mesh& mesh, const FaceNeighbours& neighbours, const std::vector<int>& labels,
+                       const ChartPoints& points)
     : sums_(points.point.size(), Rgb{}), weights_(points.point.size()) {
   for_each_seam_side(neighbours, labels, [&](std::size_t f, int k, std::int32_t) {
     const int next = (k + 1) % 3;

@@ -19,14 +19,14 @@ ChartPoints chart_points(const Mesh& mesh, const std::vector<int>& labels);
 struct Seam {
   std::int32_t a, b;
 };
-std::vector<Seam> seams(const Mesh& mesh, const FaceNeighbours& neighbours,
-                        const std::vector<int>& labels, const ChartPoints& points);
+std::vector<Seam> seams(const Mesh& mesh, const FaceNeighbours& neighbours, const std::vector<int>& labels,
+                        const ChartPoints& points);
 
 /// Mean colour along the seams near each chart point, as its view shows it.
 class SeamColors {
  public:
-  SeamColors(const Mesh& mesh, const FaceNeighbours& neighbours,
-             const std::vector<int>& labels, const ChartPoints& points);
+  SeamColors(const Mesh& mesh, const FaceNeighbours& neighbours, const std::vector<int>& labels,
+             const ChartPoints& points);
   /// Looks along all seams of a view in its picture (display values).
   void add(int view, const PinholeCamera& camera, const Image& display);
   /// One a chart point; 0 away from seams.

@@ -32,8 +32,7 @@ void encode_for_display(const Rgb& gain, Image& rgb) {
     rgb.data()[i] = srgb_encode(std::clamp(gain[i % 3] * rgb.data()[i], 0.0f, 1.0f));
 }
 
-std::vector<Chart> find_charts(const FaceNeighbours& neighbours,
-                               const std::vector<int>& labels) {
+std::vector<Chart> find_charts(const FaceNeighbours& neighbours, const std::vector<int>& labels) {
   std::vector<Chart> charts;
   std::vector<std::uint8_t> taken(labels.size());
   for (std::uint32_t first = 0; first < labels.size(); ++first) {

@@ -102,8 +102,8 @@ struct Choices {
 
 class Labelling {
  public:
-  Labelling(const FaceNeighbours& neighbours,
-            const std::vector<std::vector<FaceView>>& views, const ViewChoiceOptions& options)
+  Labelling(const FaceNeighbours& neighbours, const std::vector<std::vector<FaceView>>& views,
+            const ViewChoiceOptions& options)
       : neighbours_(neighbours), seam_(static_cast<float>(options.seam_cost)), threads_(options.threads) {
     for (const auto& of_face : views) choices_.emplace_back(of_face);
     messages_.resize(choices_.size());
@@ -217,9 +217,9 @@ void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads) {
       });
 }
 
-std::int64_t drop_transients(const FaceNeighbours& neighbours,
-                             const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
-                             const ViewChoiceOptions& options, std::vector<std::vector<FaceView>>& views) {
+std::int64_t drop_transients(const FaceNeighbours& neighbours, const std::vector<Rgb>& gains,
+                             const std::vector<Rgb>& canonical, const ViewChoiceOptions& options,
+                             std::vector<std::vector<FaceView>>& views) {
   Flags flags(views.size());
   parallel_for_blocks(
       std::ssize(views), kChoiceGrain, options.threads, [&](std::int64_t begin, std::int64_t end, int) {

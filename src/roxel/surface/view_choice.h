@@ -23,9 +23,9 @@ void weigh_sharpness(std::vector<std::vector<FaceView>>& views, int threads);
 /// Takes out the views that disagree with the others on a triangle's colour, and on those of most of the
 /// triangles around it: what stood there for a moment. Returns how many. Colours are compared after the gains
 /// of their views; `canonical` (one a triangle, or empty) has a voice of its own among them.
-std::int64_t drop_transients(const FaceNeighbours& neighbours,
-                             const std::vector<Rgb>& gains, const std::vector<Rgb>& canonical,
-                             const ViewChoiceOptions& options, std::vector<std::vector<FaceView>>& views);
+std::int64_t drop_transients(const FaceNeighbours& neighbours, const std::vector<Rgb>& gains,
+                             const std::vector<Rgb>& canonical, const ViewChoiceOptions& options,
+                             std::vector<std::vector<FaceView>>& views);
 
 /// The view of every triangle, kNoView where none sees it. By loopy belief propagation (min-sum, damped, all
 /// triangles at once) and then single changes for the better. The same for any number of threads.
