@@ -45,6 +45,7 @@ CHANGES = {
     "passes": ([], ["--passes", "1"]),
     "predictive": ([], ["--no-predictive"]),
     "prior-opacity": ([], ["--prior-opacity", "0.1"]),
+    "prior-sharpness": ([], ["--prior-sharpness", "1"]),
     "prior-strength": ([], ["--prior-strength", "50"]),
     "ray-weights": ([], ["--ray-weights"]),
     "resolution": ([], ["--resolution", "24"]),

@@ -45,12 +45,20 @@ float sheet_opacity(const float* centre) {
   return best;
 }
 
+/// What is more opaque than not becomes more so, and the rest less.
+float sharpened(float opacity, float power) {
+  constexpr float kEvenOdds = kEvenOpacity / (1 - kEvenOpacity);
+  const float full = std::pow(opacity, power), empty = std::pow(kEvenOdds * (1 - opacity), power);
+  return full / (full + empty);
+}
+
 void sheet_prior_of_brick(const BrickIndex& index, int brick_idx, const std::vector<float>& opacity,
                           const PriorOptions& prior, std::vector<float>& field) {
   float block[kBlockVoxels];
   gather_block(index, opacity.data(), brick_idx, 0.0f, block);
   const Brick& brick = index.bricks()[brick_idx];
   const float lambda = static_cast<float>(prior.spatial_lambda);
+  const float power = static_cast<float>(prior.sharpness);
   const float base = (1 - lambda) * static_cast<float>(prior.opacity);
   for (int k = 0; k < kBrickSide; ++k)
     for (int j = 0; j < kBrickSide; ++j)
@@ -58,7 +66,8 @@ void sheet_prior_of_brick(const BrickIndex& index, int brick_idx, const std::vec
         const std::uint16_t voxel = brick.local[voxel_in_brick(i, j, k)];
         if (voxel == kNoVoxel) continue;
         const float* centre = block + voxel_in_block(i, j, k);
-        field[brick.first_slot + voxel] = base + lambda * sheet_opacity(centre);
+        const float sheet = sheet_opacity(centre);
+        field[brick.first_slot + voxel] = base + lambda * (power > 1 ? sharpened(sheet, power) : sheet);
       }
 }
 

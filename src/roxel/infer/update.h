@@ -12,11 +12,14 @@ struct PriorOptions {
   double opacity = 0.02;         ///< alpha_0, in (0, 1)
   double strength = 1;           ///< beta >= 0, in observations
   double spatial_lambda = 0.99;  ///< lambda in [0, 1]: weight of the neighbours' opacity in the prior's mode
+  double sharpness = 1;          ///< g >= 1: power that the odds of the neighbours' opacity are raised to
 };
 
 /// The prior's mode of every voxel, as opacity: (1 - lambda) alpha_0 + lambda * the largest mean opacity of
 /// the voxel's neighbours in one of the 13 planes with a neighbour's direction as normal; absent neighbours
-/// count 0.
+/// count 0. With a sharpness g > 1 that mean m becomes o^g / (1 + o^g) for o = m / (1 - m) over the odds of
+/// kEvenOpacity.
+inline constexpr float kEvenOpacity = 0.45f;
 std::vector<float> prior_opacity_field(const Volume& volume, const PriorOptions& prior, int threads);
 
 struct UpdateReport {

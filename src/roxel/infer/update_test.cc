@@ -108,6 +108,23 @@ TEST(SheetPrior, LambdaZeroIsAlphaZeroAndLambdaOneIsTheNeighbours) {
   EXPECT_NEAR(prior_at(volume, 10, 5, 5, 1), 0, 1e-6);
 }
 
+// 0.6 against 0.45: odds of 1.5 over 0.818.
+TEST(SheetPrior, SharpnessDrivesOpacitiesApart) {
+  const Volume volume = volume_where(everywhere, [](int x, int, int) { return x == 7 ? 0.6 : 0; });
+  const auto at = [&](int x, double sharpness) {
+    return prior_opacity_field(volume, {kAlpha0, 5, kLambda, sharpness}, 1)[slot_at(volume, x, 7, 8)];
+  };
+  EXPECT_EQ(at(7, 1), prior_at(volume, 7, 7, 8));
+  const double odds = 1.5 / (0.45 / 0.55), beside = 0.225 / 0.775 / (0.45 / 0.55);
+  EXPECT_NEAR(at(7, 2), mixed(odds * odds / (1 + odds * odds)), 1e-6);
+  EXPECT_NEAR(at(7, 3), mixed(std::pow(odds, 3) / (1 + std::pow(odds, 3))), 1e-6);
+  EXPECT_NEAR(at(8, 2), mixed(beside * beside / (1 + beside * beside)), 1e-6);
+  EXPECT_NEAR(at(9, 2), mixed(0), 1e-6);
+  const Volume solid = volume_where(everywhere, [](int, int, int) { return 1 - 1e-7; });
+  EXPECT_NEAR(prior_opacity_field(solid, {kAlpha0, 5, kLambda, 2}, 1)[slot_at(solid, 7, 7, 8)], mixed(1),
+              1e-5);
+}
+
 TEST(SheetPrior, DoesNotDependOnThreads) {
   std::mt19937 random(1);
   const Volume volume = fixture::random_volume({4, 4, 4}, 0.5, 0.01, 3, random);

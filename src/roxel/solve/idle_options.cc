@@ -29,6 +29,8 @@ constexpr IdleRule kIdleRules[] = {
      "the background has no known colour; see --background"},
     {"acceleration", [](const Chosen& o, const Scene&) { return o.update == UpdateRule::kRoxels; },
      "--update roxels takes no steps of opacity that could be longer"},
+    {"prior-sharpness", [](const Chosen& o, const Scene&) { return o.spatial_prior == 0; },
+     "--spatial-prior 0 asks no neighbours"},
     {"prior-strength", [](const Chosen& o, const Scene&) { return o.update == UpdateRule::kRoxels; },
      "--update roxels has no prior where rays hit a voxel"},
     {"matching-blur", [](const Chosen&, const Scene& s) { return !s.light.local_matching; },

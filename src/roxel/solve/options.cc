@@ -226,6 +226,12 @@ void add_opacity(OptionTable<Options>& table) {
       .help("Weight of the neighbours' opacity in the prior: surfaces are sheets")
       .range(0, 1)
       .source("docs/passes.md; raised when the thirteen planes came, figures not kept");
+  table.add("prior-sharpness", &Options::prior_sharpness)
+      .help(
+          "Power that the odds of the neighbours' opacity are raised to in the prior of the run's last pass: "
+          "surfaces are opaque; 1: none")
+      .range(1, 10)
+      .source("docs/passes.md; measured on plane and head");
   table.add("prior-strength", &Options::prior_strength)
       .help("Weight of the prior")
       .unit("observations")

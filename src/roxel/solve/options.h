@@ -65,6 +65,7 @@ struct ReconstructOptions {
   // Opacity
   UpdateRule update = UpdateRule::kPosterior;
   double spatial_prior = 0.99;
+  double prior_sharpness = 2;
   double prior_strength = 1;
   double prior_opacity = 0.02;
   double acceleration = 12;

@@ -183,7 +183,10 @@ class LevelPasses {
     for (;;) {
       const bool draft = ++state.passes <= state.draft_passes;
       const bool last = state.resting || state.passes == options_.passes;
-      const PassRecord& record = run_one(state, draft, draft ? samples.drafts() : samples.finest(), scene,
+      PassOptions pass = pass_options(scene, options_);
+      pass.everywhere = first_ever_ && state.passes == 1;
+      if (last && state.level == options_.levels) pass.prior.sharpness = options_.prior_sharpness;
+      const PassRecord& record = run_one(state, draft, draft ? samples.drafts() : samples.finest(), pass,
                                          last ? nullptr : &acceleration, volume, summary);
       const bool rests = record.mean_opacity_change < options_.tolerance;
       if (last) return state.resting || rests;
@@ -201,13 +204,11 @@ class LevelPasses {
 
  private:
   const PassRecord& run_one(const PassState& state, bool draft, const std::vector<SampleNode>& samples,
-                            const Scene& scene, Acceleration* acceleration, Volume& volume,
+                            const PassOptions& pass, Acceleration* acceleration, Volume& volume,
                             Summary& summary) {
     const auto start = Clock::now();
-    PassOptions pass_opts = pass_options(scene, options_);
-    pass_opts.everywhere = first_ever_ && state.passes == 1;
     const PassReport report = run_pass(
-        samples, pass_opts, context_,
+        samples, pass, context_,
         [&](double fraction) { progress_.report(state.level, state.passes, fraction); }, volume, acceleration,
         &memory_);
     summary.passes.push_back(
