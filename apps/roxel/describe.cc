@@ -112,7 +112,7 @@ std::string row(const std::string& label, const std::string& value) {
 
 /// Of a pixel that shows the object, on one core, measured on synthetic heads: belief propagation, fusion and
 /// texture; and refinement, of a pixel as it sees them. Others cost next to nothing.
-constexpr double kSurfaceSecondsPerPixel = 8e-6, kRefineSecondsPerPixel = 20e-6;
+constexpr double kSurfaceSecondsPerPixel = 7e-6, kRefineSecondsPerPixel = 15e-6;
 
 /// `voxel_px`: pixels that a voxel is across.
 double surface_seconds(const Dataset& dataset, double voxel_px, const DepthStageOptions& depth, int threads) {

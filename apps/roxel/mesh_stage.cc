@@ -2,6 +2,7 @@
 #include "common.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <chrono>
 #include <functional>
 
@@ -10,6 +11,7 @@
 #include "roxel/base/formatted.h"
 #include "roxel/base/parallel.h"
 #include "roxel/base/peak_memory.h"
+#include "roxel/depth/scaled_view.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_bytes.h"
 #include "roxel/io/image_file.h"
@@ -33,6 +35,8 @@ namespace fs = std::filesystem;
 constexpr int kTurnSize = 240;          ///< pixels
 constexpr double kOnTheirSides = 1.02;  ///< how much more alike photographs are in what is right than up
 constexpr int kShownViews = 4;
+constexpr int kMostViewsHeld = 4;          ///< photographs at once
+constexpr double kBytesPerPixelHeld = 40;  ///< of one, while it is read
 constexpr int kShownWidth = 480;
 
 std::string size_text(int width, int height) {
@@ -179,6 +183,13 @@ class MeshStage {
     return {view.camera, std::move(photo.rgb), std::move(photo.foreground)};
   }
 
+  /// As many photographs as half of the memory that is left has room for.
+  int views_held() const {
+    const double largest = std::ranges::max(pixels_of_views(input_.dataset));
+    const double fit = 0.5 * static_cast<double>(bytes_left(input_.memory)) / (kBytesPerPixelHeld * largest);
+    return std::clamp(static_cast<int>(std::min<double>(fit, kMostViewsHeld)), 1, kMostViewsHeld);
+  }
+
   int view_count() const { return static_cast<int>(input_.dataset.views.size()); }
 
   void color() {
@@ -188,6 +199,7 @@ class MeshStage {
     const MeshRays rays(surface_.mesh);
     SightOptions sight;
     sight.tolerance = voxel_size_;
+    sight.views_held = views_held();
     const std::vector<Rgb> as_they_are(input_.dataset.views.size(), Rgb{1, 1, 1});
     surface_.colors = photograph_colors(
         surface_, rays, view_count(), [&](int v) { return texture_view(v); }, as_they_are, surface_.colors,
@@ -202,6 +214,7 @@ class MeshStage {
     wanted.sight_tolerance = voxel_size_;
     wanted.seam_cost = options_.seam_cost;
     wanted.transient = options_.transient;
+    wanted.views_held = views_held();
     textured_ = textured(
         std::move(surface_), view_count(), [&](int v) { return texture_view(v); }, wanted, context_);
     out_.figures["texture"] = {{"width", textured_->picture.width()},

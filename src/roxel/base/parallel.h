@@ -21,13 +21,12 @@ void parallel_for(std::int64_t count, int threads,
 void parallel_for_blocks(std::int64_t count, std::int64_t grain, int threads,
                          const std::function<void(std::int64_t begin, std::int64_t end, int worker)>& body);
 
-inline constexpr int kMostPrepared = 4;  ///< things that for_each_prepared holds at once
-
 /// Calls visit(index, thing) for every index in [0, count) in order, on the calling thread, with what
-/// prepare(index) made of it on any of at most `threads` threads: as many at once, up to kMostPrepared.
+/// prepare(index) made of it on any of at most `threads` threads. Holds at most `most_held` things.
 template <class Prepare, class Visit>
-void for_each_prepared(std::int64_t count, int threads, const Prepare& prepare, const Visit& visit) {
-  const int at_once = std::clamp(threads, 1, kMostPrepared);
+void for_each_prepared(std::int64_t count, int most_held, int threads, const Prepare& prepare,
+                       const Visit& visit) {
+  const int at_once = std::max(1, std::min(most_held, threads));
   std::vector<std::optional<decltype(prepare(std::int64_t{0}))>> things(at_once);
   for (std::int64_t begin = 0; begin < count; begin += at_once) {
     const std::int64_t here = std::min<std::int64_t>(at_once, count - begin);

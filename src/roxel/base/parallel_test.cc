@@ -126,12 +126,13 @@ TEST_P(ParallelFor, PreparedThingsAreVisitedInOrderAndFewAtOnce) {
   };
   std::atomic<int> alive{0};
   std::int64_t next = 0;
+  constexpr int kMost = 3;
   for_each_prepared(
-      23, GetParam(), [&](std::int64_t i) { return Counted(i, &alive); },
+      23, kMost, GetParam(), [&](std::int64_t i) { return Counted(i, &alive); },
       [&](std::int64_t i, const Counted& thing) {
         EXPECT_EQ(i, next++);
         EXPECT_EQ(thing.index, i);
-        EXPECT_LE(alive, std::min(GetParam(), kMostPrepared));
+        EXPECT_LE(alive, std::min(GetParam(), kMost));
       });
   EXPECT_EQ(next, 23);
   EXPECT_EQ(alive, 0);

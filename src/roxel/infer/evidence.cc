@@ -160,7 +160,8 @@ ROXEL_KERNEL void leave_out_entries(const ColorTotals* totals, const OwnColors::
 ROXEL_KERNEL void set_up(const float* tau, const VoxelColor* colors, std::uint32_t count,
                          VoxelScratch* voxels) {
   static_assert(offsetof(VoxelScratch, evidence) == 9 * sizeof(float) &&
-                offsetof(VoxelScratch, tau) == 10 * sizeof(float));
+                offsetof(VoxelScratch, tau) == 10 * sizeof(float) &&
+                sizeof(VoxelScratch) == 2 * sizeof(Floats));
   for (std::uint32_t i = 0; i < count; ++i) {
     Floats low{}, high{};
     if (colors) {

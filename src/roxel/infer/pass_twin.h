@@ -316,6 +316,10 @@ class PassTwin {
         if (step.dot(normal) == 0) sum += alpha(ijk(of) + step), ++count;
       best = std::max(best, sum / count);
     }
+    if (const double g = options_.prior.sharpness; g > 1) {
+      const double odds = best / (1 - best) * (1 - kSharpenedAround) / kSharpenedAround;
+      best = 1 - 1 / (1 + std::pow(odds, g));
+    }
     return (1 - options_.prior.spatial_lambda) * options_.prior.opacity +
            options_.prior.spatial_lambda * best;
   }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "roxel/infer/infer_fixture.h"
+#include "roxel/march/brick_lists.h"
 
 namespace roxel {
 namespace {
@@ -80,6 +81,50 @@ void expect_same(const PassOptions& chosen, int divisions, double largest_tau, u
 
 TEST(RunPass, PosteriorIsItsSlowTwin) { expect_same(calm(), 0, 0.15, 1); }
 
+/// Views in which the volume is small: whole tiles of samples meet nothing, and some only once divided.
+std::vector<SampleNode> views_of_little(const Volume& volume, int divisions, std::mt19937& random) {
+  const Eigen::Vector3d centre = volume.index(0).frame().box().center();
+  constexpr int kSize = 92;  // no multiple of a tile
+  std::vector<SampleNode> nodes;
+  for (const Eigen::Vector3d& towards : {Eigen::Vector3d(1, 0.2, -0.3), Eigen::Vector3d(-0.4, 0.5, 1)}) {
+    const PinholeCamera camera = fixture::camera_at(centre + 26 * towards.normalized(),
+                                                    centre + Eigen::Vector3d(3, -2, 1), kSize, 0.55 * kSize);
+    Mask valid(kSize, kSize, 255), foreground(kSize, kSize, 0);
+    for (int y = 0; y < kSize; ++y)
+      for (int x = 0; x < kSize; ++x) {
+        if (x < 9 || (x + y) % 11 == 0) valid.data()[y * kSize + x] = 0;
+        foreground.data()[y * kSize + x] = static_cast<std::uint8_t>((37 * x + 11 * y) % 256);
+      }
+    std::vector<double> divide_at;
+    for (int d = 0; d < divisions; ++d) divide_at.push_back(22 + 4 * d);
+    nodes.push_back({fixture::view_of(camera, fixture::random_image(kSize, random),
+                                      fixture::plan_of({1, 60}, divisions, divide_at), valid, foreground)});
+  }
+  return nodes;
+}
+
+// What rays that meet nothing say is summed up without them.
+TEST(RunPass, BackgroundsAroundALittleObjectAreTheirSlowTwins) {
+  for (const BackgroundKind kind : {BackgroundKind::kUnknown, BackgroundKind::kKnown, BackgroundKind::kMask})
+    for (int divisions = 0; divisions < 3; ++divisions) {
+      SCOPED_TRACE(divisions);
+      std::mt19937 random(12);
+      Volume volume = random_volume({2, 1, 1}, 0.7, 0.005, 0.15, random);
+      const std::vector<SampleNode> nodes = views_of_little(volume, divisions, random);
+      const BrickLists lists(LatticeStack(volume), nodes[0][0].camera, nodes[0][0].plan);
+      EXPECT_TRUE(lists.none_from(divisions, 0, 0));
+      PassOptions options = calm();
+      options.opacity.background.kind = kind;
+      options.opacity.background.mean[0] = 30;
+      PassTwin twin(volume, options);
+      twin.run(nodes);
+      const PassReport report = run_pass(nodes, options, RunContext(1), nullptr, volume);
+      EXPECT_LE(difference(volume, twin).tau, kTolerance);
+      EXPECT_NEAR(report.opacity.log_likelihood, twin.log_likelihood(),
+                  1e-5 * std::abs(twin.log_likelihood()));
+    }
+}
+
 TEST(RunPass, PosteriorWithoutPredictionIsItsSlowTwin) {
   PassOptions options = calm();
   options.predictive = false;
@@ -96,6 +141,12 @@ TEST(RunPass, RayWeightsAreTheirSlowTwins) {
   PassOptions options = calm();
   options.opacity.ray_weights = true;
   expect_same(options, 1, 0.15, 5);
+}
+
+TEST(RunPass, SharpenedPriorIsItsSlowTwin) {
+  PassOptions options = calm();
+  options.prior.sharpness = 2;
+  expect_same(options, 1, 0.8, 11);
 }
 
 TEST(RunPass, RoxelsRuleIsItsSlowTwin) {

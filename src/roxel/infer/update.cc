@@ -45,10 +45,10 @@ float sheet_opacity(const float* centre) {
   return best;
 }
 
-/// What is more opaque than not becomes more so, and the rest less.
+/// Drives opacities apart, to both sides of kSharpenedAround.
 float sharpened(float opacity, float power) {
-  constexpr float kEvenOdds = kEvenOpacity / (1 - kEvenOpacity);
-  const float full = std::pow(opacity, power), empty = std::pow(kEvenOdds * (1 - opacity), power);
+  constexpr float kOdds = kSharpenedAround / (1 - kSharpenedAround);
+  const float full = std::pow(opacity, power), empty = std::pow(kOdds * (1 - opacity), power);
   return full / (full + empty);
 }
 

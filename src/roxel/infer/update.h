@@ -15,11 +15,15 @@ struct PriorOptions {
   double sharpness = 1;          ///< g >= 1: power that the odds of the neighbours' opacity are raised to
 };
 
+/// Opacity that a sharpened prior parts empty from opaque at. Measured on a head: at 0.5 outlines wear off
+/// (the error of renders over the object's pixels rises by a thirtieth), at 0.4 they swell (0.2 % more depths
+/// are off by over four voxels).
+inline constexpr float kSharpenedAround = 0.45f;
+
 /// The prior's mode of every voxel, as opacity: (1 - lambda) alpha_0 + lambda * the largest mean opacity of
 /// the voxel's neighbours in one of the 13 planes with a neighbour's direction as normal; absent neighbours
 /// count 0. With a sharpness g > 1 that mean m becomes o^g / (1 + o^g) for o = m / (1 - m) over the odds of
-/// kEvenOpacity.
-inline constexpr float kEvenOpacity = 0.45f;
+/// kSharpenedAround.
 std::vector<float> prior_opacity_field(const Volume& volume, const PriorOptions& prior, int threads);
 
 struct UpdateReport {

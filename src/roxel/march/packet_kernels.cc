@@ -252,6 +252,7 @@ HWY_INLINE void keep_existing(const BrickCrossings& crossings, int rows, const W
   }
   steps.count = count;
   steps.rows = kept_rows;
+  hn::StoreU(hn::Zero(di), di, steps.ray + count);  // what is read behind the count is harmless
 }
 
 /// Slots from words: where the word's first voxel is, which first_of(ray, which word) finds, and how many of
@@ -402,7 +403,6 @@ void walk(const PacketRays& rays, BrickCrossings& crossings, PacketSteps& steps)
   if (steps.count == 0) return;
   const FloatTag df;
   const IntTag di;
-  hn::StoreU(hn::Zero(di), di, steps.ray + steps.count);  // what is read behind the count is harmless
   weigh(rays, crossings, steps);
   for (int i = steps.count; i < steps.count + kMaxPacketRays; i += kRays) {  // harmless, whoever reads on
     hn::StoreU(hn::Set(di, static_cast<std::int32_t>(steps.slot[0])), di,

@@ -27,8 +27,8 @@ constexpr double kSurroundSteps = 4;         ///< more steps a ray for each surr
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
 // Nanoseconds on one core: a ray-voxel step of the colour and the opacity march, loading a pixel.
-constexpr double kColorStepNs = 27;  // with what is done once a voxel and node
-constexpr double kOpacityStepNs = 40;
+constexpr double kColorStepNs = 24;  // with what is done once a voxel and node
+constexpr double kOpacityStepNs = 34;
 constexpr double kLoadPixelNs = 60;
 constexpr double kDraftCost = 0.45;  ///< of a pass on all samples
 

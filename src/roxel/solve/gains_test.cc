@@ -64,7 +64,7 @@ double mean_log_color(const Reconstruction& made) {
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (brick.local[v] == kNoVoxel) continue;
       const std::uint32_t slot = brick.first_slot + brick.local[v];
-      if (alpha_from_tau(made.volume.tau[slot]) < 0.5f) continue;
+      if (alpha_from_tau(made.volume.tau[slot]) < 0.5f || made.volume.color_weight[slot] <= 0) continue;
       const Eigen::Vector3d at =
           index.frame().voxel_centre(kBrickSide * brick.coord + Eigen::Vector3i(v % 8, v / 8 % 8, v / 64));
       if (at.cwiseAbs().maxCoeff() > 0.5) continue;

@@ -30,6 +30,8 @@ const IdleCase kIdleCases[] = {
      [](auto&, auto& s) { s.background.kind = BackgroundKind::kMask; },
      [](auto&, auto& s) { s.background.kind = BackgroundKind::kKnown; }},
     {"acceleration", [](auto& o) { o.acceleration = 4; }, by_roxels, as_it_is},
+    {"prior-sharpness", [](auto& o) { o.prior_sharpness = 3; }, [](auto& o, auto&) { o.spatial_prior = 0; },
+     as_it_is},
     {"prior-strength", [](auto& o) { o.prior_strength = 4; }, by_roxels, as_it_is},
     {"matching-blur", [](auto& o) { o.matching_blur = 9; }, as_it_is,
      [](auto&, auto& s) { s.light.local_matching = true; }},

@@ -155,6 +155,9 @@ class LevelSamples {
     CollectedColors colors(volume.slot_count(), samples.size(), 0);
     collect_color(stack, samples, pass, context_, nullptr, colors);
     update_color(colors.of_totals, context_.thread_count(), volume);
+    for (std::uint32_t slot = 0; slot < volume.slot_count();
+         ++slot)  // what none shows has only the other colour
+      if (colors.of_totals[slot].evidence <= 0) volume.color_weight[slot] = 0;
   }
 
  private:
@@ -177,10 +180,11 @@ class LevelPasses {
 
   /// Passes, the first of them drafts, until the opacities rest or the limit is reached; returns whether they
   /// rest. The last pass is never hurried, and no light changes after it: its opacities follow from its sums
-  /// alone, which `merge` relies on. `between` is called where another pass follows.
+  /// alone, which `merge` relies on. Where its prior is sharpened, its changes are the prior's: whether they
+  /// rest says the pass before. `between` is called where another pass follows.
   bool run(LevelSamples& samples, Acceleration& acceleration, const std::function<void()>& between,
            PassState& state, Scene& scene, Volume& volume, Summary& summary) {
-    for (;;) {
+    for (bool rested = false;;) {
       const bool draft = ++state.passes <= state.draft_passes;
       const bool last = state.resting || state.passes == options_.passes;
       PassOptions pass = pass_options(scene, options_);
@@ -189,7 +193,8 @@ class LevelPasses {
       const PassRecord& record = run_one(state, draft, draft ? samples.drafts() : samples.finest(), pass,
                                          last ? nullptr : &acceleration, volume, summary);
       const bool rests = record.mean_opacity_change < options_.tolerance;
-      if (last) return state.resting || rests;
+      if (last) return state.resting || (pass.prior.sharpness > 1 ? rested : rests);
+      rested = rests && !draft;
       if (scene.light.from == LightSource::kGain && !state.light_rests) {
         memory_.release();
         fit_light(state, samples, scene, volume, summary);

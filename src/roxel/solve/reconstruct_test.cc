@@ -280,6 +280,28 @@ TEST(Reconstruct, SaysWhatWasSurveyedBeforeTheFirstPass) {
             "a note of the reader");
 }
 
+// All passes but the finest level's last are the same for any sharpness.
+TEST(Reconstruct, OnlyTheVeryLastPassIsSharpened) {
+  const auto changes = [](double sharpness) {
+    ReconstructOptions options = cube_options();
+    options.passes = 4;
+    options.prior_sharpness = sharpness;
+    std::vector<double> found;
+    ReconstructHooks hooks;
+    hooks.after_pass = [&](const PassRecord& pass) { found.push_back(pass.mean_opacity_change); };
+    RunContext context(2);
+    reconstruct(cube_dataset(6, 24), cube_loader(), options, context, hooks);
+    return found;
+  };
+  std::vector<double> plain = changes(1), sharp = changes(2);
+  ASSERT_EQ(plain.size(), sharp.size());
+  EXPECT_GT(plain.size(), 5u);
+  EXPECT_NE(plain.back(), sharp.back());
+  plain.pop_back();
+  sharp.pop_back();
+  EXPECT_EQ(plain, sharp);
+}
+
 // What a run leaves is an EM step: the sums that merge adds up again.
 TEST(Reconstruct, TheLastPassOfALevelIsPlain) {
   const auto only_pass = [](double acceleration) {

@@ -41,14 +41,15 @@ class Facing {
   Facing() = default;
   Facing(float weight, float cosine)
       : weight_(static_cast<std::uint16_t>((std::bit_cast<std::uint32_t>(weight) + 0x8000u) >> 16)),
-        cosine_(static_cast<std::uint16_t>(cosine * kUnit + 0.5f)) {}
+        cosine_(static_cast<std::uint16_t>(std::min(cosine * kUnit + 0.5f, 65535.0f))) {}
   /// To 8 bits.
   float weight() const { return std::bit_cast<float>(static_cast<std::uint32_t>(weight_) << 16); }
   /// That turns a distance along the axis into one along the normal.
   float cosine() const { return static_cast<float>(cosine_) * (1 / kUnit); }
 
  private:
-  static constexpr float kUnit = 1 << 14;  // directions are longer than 1 off the axis: so is their cosine
+  /// Directions are longer than 1 off the axis, and so is their cosine: up to 86 degrees off.
+  static constexpr float kUnit = 1 << 12;
   std::uint16_t weight_ = 0, cosine_ = 0;
 };
 static_assert(sizeof(float) + sizeof(Facing) == kBytesPerPixel);

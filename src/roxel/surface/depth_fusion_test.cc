@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "roxel/base/error.h"
 #include "roxel/surface/surface_extraction.h"
 #include "roxel/surface/surface_fixture.h"
@@ -102,10 +104,14 @@ TEST(DepthFusion, EmptyRaysWeighAgainstASurface) {
 
 TEST(DepthFusion, IsTheSameForAnyNumberOfThreads) {
   const auto points_of = [](int threads) {
-    return extract_surface(fused(ball_views(), fixture::ball_fusion(), threads), {}).surface.mesh.points;
+    FusionOptions fine = fixture::ball_fusion();
+    fine.voxel_size /= 4;  // so that there is more than one block of points
+    ExtractionOptions extraction;
+    extraction.threads = threads;
+    return extract_surface(fused(ball_views(), fine, threads), extraction).surface.mesh.points;
   };
   const auto one = points_of(1);
-  EXPECT_GT(one.size(), 500u);
+  EXPECT_GT(one.size(), std::size_t{1} << 14);
   EXPECT_EQ(one, points_of(2));
   EXPECT_EQ(one, points_of(4));
 }
@@ -151,18 +157,63 @@ TEST(DepthFusion, ViewsCountAsMemoryTooAndHowManyAreHeldChangesNothing) {
       } catch (const InvalidInput&) {
       }
   };
-  EXPECT_GT(least(512), least(256) + 2 * (512 * 512 - 256 * 256) * 16);
+  // Of each of two views on two threads 64 bytes a pixel while it is read, and 8 once it is ready.
+  EXPECT_GT(least(512), least(256) + 2 * (512 * 512 - 256 * 256) * 70);
 
-  FusionOptions ample = fixture::ball_fusion(), tight = ample;
-  const auto points = [](const FusionOptions& options) {
-    return extract_surface(fused(ball_views(), options, 1), {}).surface.mesh.points;
+  std::vector<FusionView> views;
+  for (const PinholeCamera& camera : fixture::cameras_around(8, 256))
+    views.push_back(fixture::ball_view(camera));
+  struct Outcome {
+    std::vector<Vector3d> points;
+    int loaded = 0;
   };
-  const auto expected = points(ample);
+  const auto outcome = [&](const FusionOptions& options) {
+    std::atomic<int> loaded{0};
+    RunContext context(1);
+    const auto load = [&](int v) { return ++loaded, views[v]; };
+    const DistanceField field = fuse_depth(8, load, options, context);
+    return Outcome{extract_surface(field, {}).surface.mesh.points, loaded};
+  };
+  const FusionOptions ample = fixture::ball_fusion();
+  const Outcome expected = outcome(ample);
+  EXPECT_EQ(expected.loaded, 8);  // they stay
+  FusionOptions tight = ample;
   for (tight.most_bytes = 1 << 20;; tight.most_bytes += tight.most_bytes / 16) try {
-      EXPECT_EQ(points(tight), expected);
+      const Outcome found = outcome(tight);
+      EXPECT_EQ(found.points, expected.points);
+      EXPECT_EQ(found.loaded, 16);  // they are read twice
       break;
     } catch (const InvalidInput&) {
     }
+}
+
+// Far off the axis directions are much longer than 1 a unit of depth: so is what turns depth into distance.
+TEST(DepthFusion, WideLensesSeeTrueDistances) {
+  FusionView wide = wall(2.0f, 0.01f, 64);
+  wide.camera.intrinsics = {64, 64, 6, 6, 32, 32, 0};
+  const PinholeCamera& camera = wide.camera;
+  wide.normal = Image(64, 64, 3);  // all surfaces face the camera
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const Vector3d n = -camera.ray(x + 0.5, y + 0.5).direction.normalized();
+      for (int c = 0; c < 3; ++c) wide.normal.pixel(x, y)[c] = static_cast<float>(n[c]);
+    }
+  FusionOptions options = wall_options();
+  options.box = {Vector3d(-12, -12, 1), Vector3d(12, 12, 4)};
+  options.band = 10;
+  const DistanceField field = fused({wide}, options);
+  int looked = 0;
+  for (int x = 2; x < 64; x += 3) {
+    const Ray ray = camera.ray(x + 0.5, 32.5);
+    const double length = ray.direction.norm();
+    const Vector3d corner = ((1.9 * ray.direction).array() / 0.1).round() * 0.1;
+    const auto sample = field.at(corner);
+    if (!sample || sample->weight <= 0) continue;
+    ++looked;
+    // The corner is up to half a step off the ray, along each axis.
+    EXPECT_NEAR(sample->distance, std::min(0.1 * length, 1.0), 0.05 * length + 0.05) << length;
+  }
+  EXPECT_GT(looked, 15);
 }
 
 TEST(DepthFusion, CanBeCancelled) {

@@ -105,6 +105,7 @@ class Texturing {
   void choose() {
     SightOptions sight;
     sight.tolerance = options_.sight_tolerance;
+    sight.views_held = options_.views_held;
     auto views = face_views(mesh(), rays_, view_count_, load_, sight, context_);
     out_.gains.assign(view_count_, Rgb{1, 1, 1});
     if (options_.match_light) out_.gains = light_gains(out_.surface, views, view_count_);
@@ -150,7 +151,7 @@ class Texturing {
       return view;
     };
     for_each_prepared(
-        std::ssize(wanted), context_.thread_count(), shown,
+        std::ssize(wanted), options_.views_held, context_.thread_count(), shown,
         [&](std::int64_t i, const TextureView& view) { visit(wanted[i], view.camera, view.rgb); });
   }
 

@@ -14,6 +14,7 @@ struct TextureOptions {
   double sight_tolerance = 0;  ///< world units
   double seam_cost = 0.6;
   double transient = 0.12;
+  int views_held = 1;  ///< at once; changes no result
 };
 
 struct TexturedSurface {

@@ -104,13 +104,13 @@ TextureView checked(TextureView view) {
 
 /// Calls visit(v, view) for all views in order.
 template <class Visit>
-void for_each_view(int view_count, const TextureViewLoader& load, const RunContext& context,
+void for_each_view(int view_count, const TextureViewLoader& load, int views_held, const RunContext& context,
                    const Visit& visit) {
   const auto loaded = [&](std::int64_t v) {
     context.throw_if_cancelled();
     return checked(load(static_cast<int>(v)));
   };
-  for_each_prepared(view_count, context.thread_count(), loaded,
+  for_each_prepared(view_count, views_held, context.thread_count(), loaded,
                     [&](std::int64_t v, const TextureView& view) { visit(static_cast<int>(v), view); });
 }
 
@@ -142,7 +142,7 @@ std::vector<std::vector<FaceView>> face_views(const Mesh& mesh, const MeshRays& 
                                               const TextureViewLoader& load, const SightOptions& options,
                                               RunContext& context) {
   std::vector<std::vector<FaceView>> out(mesh.triangles.size());
-  for_each_view(view_count, load, context, [&](int v, const TextureView& view) {
+  for_each_view(view_count, load, options.views_held, context, [&](int v, const TextureView& view) {
     const Onlooker onlooker(view, rays, options);
     parallel_for_blocks(std::ssize(out), kTextureGrain, context.thread_count(),
                         [&](std::int64_t begin, std::int64_t end, int) {
@@ -163,7 +163,7 @@ std::vector<Rgb> photograph_colors(const Surface& surface, const MeshRays& rays,
   const std::size_t count = surface.mesh.points.size();
   std::vector<Rgb> sums(count, Rgb{});
   std::vector<float> weights(count);
-  for_each_view(view_count, load, context, [&](int v, const TextureView& view) {
+  for_each_view(view_count, load, options.views_held, context, [&](int v, const TextureView& view) {
     const Onlooker onlooker(view, rays, options);
     parallel_for_blocks(std::ssize(sums), kTextureGrain, context.thread_count(),
                         [&](std::int64_t begin, std::int64_t end, int) {

@@ -35,6 +35,7 @@ struct FaceView {
 struct SightOptions {
   double tolerance = 0;       ///< what is less than that in front of a triangle does not hide it, world units
   double least_cosine = 0.1;  ///< of the angle between line of sight and normal
+  int views_held = 1;         ///< at once; changes no result
 };
 
 /// For every triangle the views that see all of it, ascending.
