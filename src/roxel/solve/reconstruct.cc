@@ -184,17 +184,17 @@ class LevelPasses {
   /// rest says the pass before. `between` is called where another pass follows.
   bool run(LevelSamples& samples, Acceleration& acceleration, const std::function<void()>& between,
            PassState& state, Scene& scene, Volume& volume, Summary& summary) {
-    for (bool rested = false;;) {
+    for (;;) {
       const bool draft = ++state.passes <= state.draft_passes;
       const bool last = state.resting || state.passes == options_.passes;
       PassOptions pass = pass_options(scene, options_);
       pass.everywhere = first_ever_ && state.passes == 1;
       if (last && state.level == options_.levels) pass.prior.sharpness = options_.prior_sharpness;
-      const PassRecord& record = run_one(state, draft, draft ? samples.drafts() : samples.finest(), pass,
-                                         last ? nullptr : &acceleration, volume, summary);
-      const bool rests = record.mean_opacity_change < options_.tolerance;
+      const bool rested = rests_after(summary, state.level);
+      run_one(state, draft, draft ? samples.drafts() : samples.finest(), pass, last ? nullptr : &acceleration,
+              volume, summary);
+      const bool rests = summary.passes.back().mean_opacity_change < options_.tolerance;
       if (last) return state.resting || (pass.prior.sharpness > 1 ? rested : rests);
-      rested = rests && !draft;
       if (scene.light.from == LightSource::kGain && !state.light_rests) {
         memory_.release();
         fit_light(state, samples, scene, volume, summary);
@@ -208,9 +208,15 @@ class LevelPasses {
   }
 
  private:
-  const PassRecord& run_one(const PassState& state, bool draft, const std::vector<SampleNode>& samples,
-                            const PassOptions& pass, Acceleration* acceleration, Volume& volume,
-                            Summary& summary) {
+  /// Whether opacities rested in the level's pass that was done last, if there was one.
+  bool rests_after(const Summary& summary, int level) const {
+    if (summary.passes.empty()) return false;
+    const PassRecord& pass = summary.passes.back();
+    return pass.level == level && !pass.draft && pass.mean_opacity_change < options_.tolerance;
+  }
+
+  void run_one(const PassState& state, bool draft, const std::vector<SampleNode>& samples,
+               const PassOptions& pass, Acceleration* acceleration, Volume& volume, Summary& summary) {
     const auto start = Clock::now();
     const PassReport report = run_pass(
         samples, pass, context_,
@@ -223,7 +229,6 @@ class LevelPasses {
                            ": the log-likelihood is not finite; --noise, --outlier or --uninformative are "
                            "far from what colours are like");
     if (hooks_.after_pass) hooks_.after_pass(summary.passes.back());
-    return summary.passes.back();
   }
 
   static void fit_light(PassState& state, LevelSamples& samples, Scene& scene, Volume& volume,

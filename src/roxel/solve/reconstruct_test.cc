@@ -302,6 +302,26 @@ TEST(Reconstruct, OnlyTheVeryLastPassIsSharpened) {
   EXPECT_EQ(plain, sharp);
 }
 
+// The change of a sharpened pass is the prior's: it says nothing of whether opacities rest.
+TEST(Reconstruct, ASharpenedPassDoesNotHideThatALevelRests) {
+  const auto converged = [](double tolerance) {
+    ReconstructOptions options = cube_options();
+    options.levels = 1;
+    options.passes = 12;
+    options.all_passes = true;
+    options.tolerance = tolerance;
+    RunContext context(2);
+    const Reconstruction made = reconstruct(cube_dataset(6, 24), cube_loader(), options, context);
+    const std::vector<PassRecord>& passes = made.summary.passes;
+    const double before = passes[passes.size() - 2].mean_opacity_change;
+    EXPECT_GT(passes.back().mean_opacity_change, 1.5 * before);
+    return std::pair(made.summary.levels.back().converged, before);
+  };
+  const auto [far, change] = converged(1e-9);
+  EXPECT_FALSE(far);
+  EXPECT_TRUE(converged(1.2 * change).first);
+}
+
 // What a run leaves is an EM step: the sums that merge adds up again.
 TEST(Reconstruct, TheLastPassOfALevelIsPlain) {
   const auto only_pass = [](double acceleration) {

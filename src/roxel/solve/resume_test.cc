@@ -108,6 +108,18 @@ TEST(Resume, WhereOpacitiesComeToRest) {
   expect_resumes_everywhere(variant);
 }
 
+// Whether the last level rests says the pass before its last, which may lie before the checkpoint.
+TEST(Resume, WhereAllPassesAreDone) {
+  ReconstructOptions options = small_options();
+  options.tolerance = 0.05;
+  options.passes = 8;
+  options.all_passes = true;
+  const Variant variant{"all passes", cube_dataset(6, 24), cube_loader(std::array{0.0f, 0.0f, 0.0f}, true),
+                        options};
+  EXPECT_EQ(watched_run(variant).made.summary.termination, "converged");
+  expect_resumes_everywhere(variant);
+}
+
 TEST(Resume, WithSurround) {
   ReconstructOptions options = small_options();
   options.background = BackgroundChoice::kUnknown;

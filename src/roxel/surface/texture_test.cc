@@ -172,7 +172,7 @@ TEST(TextureViews, AViewSeesItsSideOfTheBall) {
 std::vector<std::vector<FaceView>> strip_views() {
   return {{{0, 10}, {1, 8}}, {{0, 10}, {1, 8}}, {{0, 10}, {1, 8}}, {{0, 8}, {1, 10}}};
 }
-const std::vector<std::array<std::int32_t, 3>> kStrip{{-1, 1, -1}, {0, 2, -1}, {1, 3, -1}, {2, -1, -1}};
+const FaceNeighbours kStrip{{-1, 1, -1}, {0, 2, -1}, {1, 3, -1}, {2, -1, -1}};
 
 TEST(ViewChoice, SeamsCostWhatTheOptionSays) {
   ViewChoiceOptions options;
@@ -185,12 +185,12 @@ TEST(ViewChoice, SeamsCostWhatTheOptionSays) {
   EXPECT_EQ(choose_views(kStrip, views, options)[1], kNoView);
 }
 
-const std::vector<std::array<std::int32_t, 3>> kAlone{{-1, -1, -1}};
+const FaceNeighbours kAlone{{-1, -1, -1}};
 
 TEST(ViewChoice, TransientsArePatchesNotSingleTriangles) {
   // A fan: the first triangle has all others around it. View 3 is off on the first alone, view 4 on all but
   // the first.
-  const std::vector<std::array<std::int32_t, 3>> fan{{1, 2, 3}, {0, -1, -1}, {0, -1, -1}, {0, -1, -1}};
+  const FaceNeighbours fan{{1, 2, 3}, {0, -1, -1}, {0, -1, -1}, {0, -1, -1}};
   const FaceView right{0, 1, {0.5f, 0.5f, 0.5f}}, wrong{0, 1, {0.9f, 0.9f, 0.9f}};
   const auto face = [&](bool third, bool fourth) {
     std::vector<FaceView> views(5, right);
