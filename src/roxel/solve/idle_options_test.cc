@@ -50,7 +50,7 @@ TEST(IdleOptions, EachIsNamedWhereItCannotActAndNowhereElse) {
     c.active(options, scene);
     EXPECT_THAT(idle_options(options, scene), testing::IsEmpty());
     options = {};
-    scene = {};
+    scene = Scene();
     c.idle(options, scene);
     EXPECT_THAT(idle_options(options, scene), testing::IsEmpty()) << "it has its default";
     c.set(options);
