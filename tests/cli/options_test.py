@@ -35,6 +35,7 @@ CHANGES = {
     "masks": ([], ["--masks", "none"]),
     "matching": ([], ["--matching", "local"]),
     "matching-blur": (["--matching", "local"], ["--matching-blur", "20"]),
+    "min-overlap": ([], ["--min-overlap", "1"]),
     "near": ([], ["--near", "5"]),
     "node-tolerance": ([], ["--node-tolerance", "100"]),
     "nodes": ([], ["--nodes", "1:4"]),

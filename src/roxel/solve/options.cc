@@ -65,6 +65,13 @@ void add_volume(OptionTable<Options>& table) {
           "end; "
           "auto: where the background is not known")
       .source("docs/volume.md; docs/background.md");
+  table.add("min-overlap", &Options::min_overlap)
+      .help(
+          "Leave out places that fewer nodes have in frame than this share of the most that have what lies "
+          "behind: "
+          "nothing hangs before the cameras where two photographs agree by chance; 0: none")
+      .range(0, 1)
+      .source("docs/volume.md; measured on dtu-scan24 without masks");
   table.add("memory", &Options::memory)
       .help(
           "Keep to this much memory: samples that do not fit are made anew in each pass, refinement holds "

@@ -6,6 +6,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/peak_memory.h"
+#include "roxel/infer/overlap.h"
 #include "roxel/infer/touch.h"
 #include "roxel/solve/fit_colors.h"
 #include "roxel/solve/gains.h"
@@ -76,8 +77,17 @@ PassRecord make_record(int level, int pass, bool draft, const Volume& volume, co
 }
 
 Volume first_volume(const Scene& scene, const std::vector<SampleNode>& samples,
-                    const ReconstructOptions& options, const RunContext& context, const Volume* initial) {
-  Volume volume(reached_voxels(frames_of_first_level(scene, options), samples, context));
+                    const ReconstructOptions& options, const RunContext& context, const Volume* initial,
+                    std::vector<std::string>& notes) {
+  std::vector<Topology> lattices = reached_voxels(frames_of_first_level(scene, options), samples, context);
+  if (options.min_overlap > 0) {
+    const std::int64_t reached = lattices[0].voxel_count();
+    const std::int64_t gone = drop_little_seen(samples, options.min_overlap, context, lattices);
+    if (gone > 0)
+      notes.push_back("overlap: " + std::to_string(gone) + " of " + std::to_string(reached) +
+                      " places left out, as few nodes have them in frame and many what lies behind");
+  }
+  Volume volume(std::move(lattices));
   if (volume.box_slot_count() == 0)
     throw_invalid("bounds", "a box and depths in which no ray of any photograph meets a voxel",
                   "a box that photographs show: see --bounds, --near, --far and the warnings of roxel info");
@@ -421,7 +431,8 @@ class Levels {
   }
 
   void make_topology(int level, const std::vector<SampleNode>& samples) {
-    made_.volume = level == 1 ? first_volume(made_.scene, samples, options_, context_, hooks_.initial)
+    made_.volume = level == 1 ? first_volume(made_.scene, samples, options_, context_, hooks_.initial,
+                                             made_.summary.notes)
                               : refine(made_.volume, refine_options(options_), context_.thread_count());
   }
 

@@ -280,6 +280,22 @@ TEST(Reconstruct, SaysWhatWasSurveyedBeforeTheFirstPass) {
             "a note of the reader");
 }
 
+// At a share of 1 every place goes that fewer nodes have in frame than what lies behind.
+TEST(Reconstruct, LeavesOutWhatFewNodesHaveInFrame) {
+  const auto made = [](double min_overlap) {
+    ReconstructOptions options = cube_options();
+    options.levels = 1;
+    options.passes = 1;
+    options.min_overlap = min_overlap;
+    RunContext context(2);
+    return reconstruct(cube_dataset(6, 24), cube_loader(), options, context);
+  };
+  const Reconstruction all = made(0), shared = made(1);
+  EXPECT_LT(shared.volume.box_slot_count(), all.volume.box_slot_count());
+  EXPECT_THAT(shared.summary.notes, ::testing::Contains(::testing::HasSubstr("overlap")));
+  EXPECT_THAT(all.summary.notes, ::testing::Not(::testing::Contains(::testing::HasSubstr("overlap"))));
+}
+
 // All passes but the finest level's last are the same for any sharpness.
 TEST(Reconstruct, OnlyTheVeryLastPassIsSharpened) {
   const auto changes = [](double sharpness) {

@@ -1,0 +1,199 @@
+#include "roxel/infer/overlap.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+
+#include "roxel/base/parallel.h"
+
+namespace roxel {
+
+namespace {
+
+constexpr int kAcross = 24;  ///< cells along each side of a frame
+constexpr int kDeep = 32;    ///< cells along a ray through the box, and one for all that lies behind it
+
+/// One view's frame, cut into cells that lie behind each other.
+class FrameCells {
+ public:
+  FrameCells(const SampleView& view, const Eigen::AlignedBox3d& box) : view_(view) {
+    double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const auto type = static_cast<Eigen::AlignedBox3d::CornerType>(corner);
+      const double depth = view.camera.camera_from_world(box.corner(type)).z();
+      nearest = std::min(nearest, depth);
+      farthest = std::max(farthest, depth);
+    }
+    const double deep = std::min(view.plan.range.end, farthest);
+    near_ = std::max({nearest, view.plan.range.begin, 1e-3 * deep});
+    per_log_ = deep > near_ ? kDeep / std::log(deep / near_) : 0;
+    const Intrinsics& k = view.camera.intrinsics;
+    const Eigen::Vector2d low((0 - k.cx) / k.fx, (0 - k.cy) / k.fy);
+    const Eigen::Vector2d high((k.width - k.cx) / k.fx, (k.height - k.cy) / k.fy);
+    sides_ = {Eigen::Vector3d(1, 0, -low.x()).normalized(), Eigen::Vector3d(0, 1, -low.y()).normalized(),
+              Eigen::Vector3d(-1, 0, high.x()).normalized(), Eigen::Vector3d(0, -1, high.y()).normalized()};
+  }
+
+  /// False where nothing of the ball is in frame.
+  bool may_hold(const Eigen::Vector3d& centre, double radius) const {
+    const Eigen::Vector3d c = view_.camera.camera_from_world(centre);
+    if (c.z() + radius < view_.plan.range.begin || c.z() - radius > view_.plan.range.end) return false;
+    return std::all_of(sides_.begin(), sides_.end(),
+                       [&](const Eigen::Vector3d& inward) { return inward.dot(c) > -radius; });
+  }
+
+  /// The cell of a point, from the nearest to the farthest of its tile, the last one behind the box; -1 out
+  /// of frame.
+  int cell(const Eigen::Vector3d& point) const {
+    const Eigen::Vector3d at = view_.camera.project(point);
+    if (!(at.z() > view_.plan.range.begin && at.z() < view_.plan.range.end)) return -1;
+    const Intrinsics& k = view_.camera.intrinsics;
+    if (!(at.x() >= 0 && at.x() < k.width && at.y() >= 0 && at.y() < k.height)) return -1;
+    const int x = static_cast<int>(kAcross * at.x() / k.width);
+    const int y = static_cast<int>(kAcross * at.y() / k.height);
+    const int deep = static_cast<int>(std::clamp(per_log_ * std::log(at.z() / near_), 0.0, double{kDeep}));
+    return (y * kAcross + x) * (kDeep + 1) + deep;
+  }
+
+ private:
+  const SampleView& view_;
+  double near_, per_log_;
+  std::array<Eigen::Vector3d, 4> sides_;
+};
+
+/// A view that has a voxel in frame, and where.
+struct Sighting {
+  int view, cell;
+};
+
+class Overlap {
+ public:
+  Overlap(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box) {
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+      for (const SampleView& view : nodes[n]) {
+        frames_.emplace_back(view, box);
+        node_of_.push_back(static_cast<int>(n));
+      }
+    most_behind_.assign(frames_.size(),
+                        std::vector<std::uint16_t>(kAcross * kAcross * (kDeep + 1), std::uint16_t{0}));
+  }
+
+  /// What is said below takes the places of the box into account once they have been added and gathered.
+  void add_brick(const LatticeFrame& frame, const Eigen::Vector3i& brick, const BrickMask& mask) {
+    for_each_voxel(frame, brick, mask, [&](int, int count, const std::vector<Sighting>& sightings) {
+      for (const Sighting& s : sightings) raise(most_behind_[s.view][s.cell], count);
+    });
+  }
+  void gather() {
+    for (std::vector<std::uint16_t>& cells : most_behind_)
+      for (int tile = 0; tile < kAcross * kAcross; ++tile) {
+        std::uint16_t* deep = cells.data() + tile * (kDeep + 1);
+        deep[kDeep] = 0;
+        for (int d = kDeep - 1; d >= 0; --d) {
+          deep[d] = std::max(deep[d], deep[d + 1]);
+          most_ = std::max(most_, deep[d]);
+        }
+      }
+  }
+
+  /// The voxels of a brick that are seen too little.
+  BrickMask little_seen(const LatticeFrame& frame, const Eigen::Vector3i& brick, const BrickMask& mask,
+                        double min_overlap) const {
+    const int fewest = std::min<int>(2, most_);
+    BrickMask out;
+    for_each_voxel(frame, brick, mask, [&](int voxel, int count, const std::vector<Sighting>& sightings) {
+      double behind = 0;
+      for (const Sighting& s : sightings) behind += most_behind_[s.view][s.cell];
+      out[voxel] = count < fewest || count * static_cast<double>(sightings.size()) < min_overlap * behind;
+    });
+    return out;
+  }
+
+ private:
+  static void raise(std::uint16_t& entry, int count) {
+    const std::uint16_t wanted = static_cast<std::uint16_t>(std::min(count, 0xffff));
+    std::atomic_ref<std::uint16_t> value(entry);
+    std::uint16_t found = value.load(std::memory_order_relaxed);
+    while (found < wanted && !value.compare_exchange_weak(found, wanted, std::memory_order_relaxed)) {
+    }
+  }
+
+  /// visit(voxel, nodes that have its centre in frame, the views that do).
+  template <class Visit>
+  void for_each_voxel(const LatticeFrame& frame, const Eigen::Vector3i& brick, const BrickMask& mask,
+                      const Visit& visit) const {
+    const Eigen::Vector3i first = kBrickSide * brick;
+    const Eigen::Vector3d middle =
+        frame.origin +
+        frame.voxel_size * (first.cast<double>() + Eigen::Vector3d::Constant(0.5 * kBrickSide));
+    const double radius = 0.5 * std::sqrt(3.0) * kBrickSide * frame.voxel_size;
+    std::vector<int> views;
+    for (std::size_t v = 0; v < frames_.size(); ++v)
+      if (frames_[v].may_hold(middle, radius)) views.push_back(static_cast<int>(v));
+    std::vector<Sighting> sightings;
+    for (int voxel = 0; voxel < kBrickVoxels; ++voxel) {
+      if (!mask[voxel]) continue;
+      const Eigen::Vector3d centre =
+          frame.voxel_centre(first + Eigen::Vector3i(voxel % kBrickSide, voxel / kBrickSide % kBrickSide,
+                                                     voxel / (kBrickSide * kBrickSide)));
+      sightings.clear();
+      int count = 0, last_node = -1;
+      for (const int view : views) {
+        const int cell = frames_[view].cell(centre);
+        if (cell < 0) continue;
+        sightings.push_back({view, cell});
+        if (node_of_[view] != last_node) ++count;
+        last_node = node_of_[view];
+      }
+      visit(voxel, count, sightings);
+    }
+  }
+
+  std::vector<FrameCells> frames_;
+  std::vector<int> node_of_;  ///< ascending
+  /// For each view and cell: the most nodes that have a place of the box in frame that is in the cell or
+  /// behind.
+  std::vector<std::vector<std::uint16_t>> most_behind_;
+  std::uint16_t most_ = 0;
+};
+
+struct PlacedBrick {
+  Eigen::Vector3i coord;
+  BrickMask mask;
+};
+
+std::vector<PlacedBrick> bricks_of(const Topology& lattice) {
+  std::vector<PlacedBrick> bricks;
+  lattice.for_each_brick([&](const Eigen::Vector3i& coord, const BrickMask& mask) {
+    bricks.push_back({coord, mask});
+  });
+  return bricks;
+}
+
+}  // namespace
+
+std::int64_t drop_little_seen(const std::vector<SampleNode>& nodes, double min_overlap,
+                              const RunContext& context, std::vector<Topology>& lattices) {
+  const std::int64_t before = lattices[0].voxel_count();
+  Overlap overlap(nodes, lattices[0].frame().box());
+  std::vector<PlacedBrick> bricks = bricks_of(lattices[0]);
+  parallel_for(bricks.size(), context.thread_count(), [&](std::int64_t b, int) {
+    context.throw_if_cancelled();
+    overlap.add_brick(lattices[0].frame(), bricks[b].coord, bricks[b].mask);
+  });
+  overlap.gather();
+  for (Topology& lattice : lattices) {
+    bricks = bricks_of(lattice);
+    parallel_for(bricks.size(), context.thread_count(), [&](std::int64_t b, int) {
+      context.throw_if_cancelled();
+      bricks[b].mask = overlap.little_seen(lattice.frame(), bricks[b].coord, bricks[b].mask, min_overlap);
+    });
+    for (const PlacedBrick& brick : bricks)
+      if (brick.mask.any()) lattice.erase_brick(brick.coord, brick.mask);
+  }
+  return before - lattices[0].voxel_count();
+}
+
+}  // namespace roxel
