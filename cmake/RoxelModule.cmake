@@ -62,7 +62,8 @@ function(roxel_module name)
     <nlohmann/json.hpp> <string> <vector>)
   install(TARGETS roxel_${name} EXPORT roxelTargets)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/roxel/${name}
-          FILES_MATCHING PATTERN "*.h" PATTERN "test_data.h" EXCLUDE)
+          FILES_MATCHING PATTERN "*.h"
+          PATTERN "*_fixture.h" EXCLUDE PATTERN "*_twin.h" EXCLUDE PATTERN "test_*.h" EXCLUDE PATTERN "temp_folder.h" EXCLUDE)
   if(ROXEL_BUILD_TESTS AND ARG_TESTS)
     roxel_module_test(${name} "${ARG_TESTS}" "${ARG_TEST_LIBS}")
   endif()

@@ -19,6 +19,8 @@ run(${CMAKE_COMMAND} --build ${consumer})
 run(${consumer}/consumer)
 message("${out}")
 # Headers for tests stay at home.
-if(EXISTS ${prefix}/include/roxel/base/test_data.h)
-  message(FATAL_ERROR "test_data.h was installed")
+file(GLOB_RECURSE for_tests ${prefix}/include/*_fixture.h ${prefix}/include/*_twin.h ${prefix}/include/test_*.h
+     ${prefix}/include/temp_folder.h)
+if(for_tests)
+  message(FATAL_ERROR "headers of tests were installed: ${for_tests}")
 endif()

@@ -5,6 +5,7 @@
 """
 
 import json
+import re
 import subprocess
 
 from program import TINY, Case, digest, files_below, main, numbers, run
@@ -29,6 +30,23 @@ class OtherCommands(Case):
             self.assertEqual(same.returncode, 0, same.stdout)
         self.succeed("render", self.run_folder, "-o", self.folder / "again", "--background-color", "1,0,0")
         self.assertNotEqual(digest(self.folder / "again/render/000.png"), digest(out / "render/000.png"))
+
+    def test_render_from_cameras_of_another_data_set(self):
+        other = self.folder / "between"
+        self.succeed("synth", "demo", "-o", other, "--images", 5, "--size", "64x48", "--quiet")
+        out = self.folder / "between-views"
+        self.succeed("render", self.run_folder, "--cameras", other, "-o", out)
+
+        def mean_error(render, photograph):
+            said = subprocess.run(["oiiotool", "--fail", "1", "--hardfail", "1", "--diff", render, photograph], capture_output=True, text=True)
+            return float(re.search(r"Mean error = (\S+)", said.stdout + said.stderr).group(1))
+
+        renders = sorted((out / "render").glob("*.png"))
+        photographs = sorted((other / "images").glob("*.png"))
+        self.assertEqual(len(renders), 5)
+        for i in (1, 2, 3):  # the first is where the run's own first is
+            right, wrong = (mean_error(renders[i], photographs[(i + step) % 5]) for step in (0, 2))
+            self.assertLess(right, 0.85 * wrong, f"{i}: {right}, {wrong}")
 
     def test_eval_measures_depth_against_the_truth(self):
         out = self.folder / "metrics"

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "roxel/base/parallel.h"
 
@@ -13,7 +14,7 @@ namespace roxel {
 namespace {
 
 constexpr int kAcross = 24;  ///< cells along each side of a frame
-constexpr int kDeep = 32;    ///< cells along a ray through the box, and one for all that lies behind it
+constexpr int kDeep = 32;    ///< cells along a ray through what is compared, and one for all that lies behind
 
 /// One view's frame, cut into cells that lie behind each other.
 class FrameCells {
@@ -30,18 +31,28 @@ class FrameCells {
     near_ = std::max({nearest, view.plan.range.begin, 1e-3 * deep});
     per_log_ = deep > near_ ? kDeep / std::log(deep / near_) : 0;
     const Intrinsics& k = view.camera.intrinsics;
-    const Eigen::Vector2d low((0 - k.cx) / k.fx, (0 - k.cy) / k.fy);
-    const Eigen::Vector2d high((k.width - k.cx) / k.fx, (k.height - k.cy) / k.fy);
-    sides_ = {Eigen::Vector3d(1, 0, -low.x()).normalized(), Eigen::Vector3d(0, 1, -low.y()).normalized(),
-              Eigen::Vector3d(-1, 0, high.x()).normalized(), Eigen::Vector3d(0, -1, high.y()).normalized()};
+    const auto edge = [&](double u, double v) { return view.camera.ray(u, v).direction; };
+    const std::array<Eigen::Vector3d, 4> edges = {edge(0, 0), edge(k.width, 0), edge(k.width, k.height),
+                                                  edge(0, k.height)};
+    const Eigen::Vector3d middle = edge(0.5 * k.width, 0.5 * k.height);
+    for (int side = 0; side < 4; ++side) {
+      const Eigen::Vector3d normal = edges[side].cross(edges[(side + 1) % 4]).normalized();
+      sides_[side] = normal.dot(middle) > 0 ? normal : Eigen::Vector3d(-normal);
+    }
   }
 
   /// False where nothing of the ball is in frame.
   bool may_hold(const Eigen::Vector3d& centre, double radius) const {
-    const Eigen::Vector3d c = view_.camera.camera_from_world(centre);
-    if (c.z() + radius < view_.plan.range.begin || c.z() - radius > view_.plan.range.end) return false;
+    const double depth = view_.camera.camera_from_world(centre).z();
+    if (depth + radius < view_.plan.range.begin || depth - radius > view_.plan.range.end) return false;
+    const Eigen::Vector3d from_eye = centre - view_.camera.pose.centre;
     return std::all_of(sides_.begin(), sides_.end(),
-                       [&](const Eigen::Vector3d& inward) { return inward.dot(c) > -radius; });
+                       [&](const Eigen::Vector3d& inward) { return inward.dot(from_eye) > -radius; });
+  }
+
+  /// Whether the point is nearer than all that is compared.
+  bool is_before(const Eigen::Vector3d& point) const {
+    return view_.camera.camera_from_world(point).z() < near_;
   }
 
   /// The cell of a point, from the nearest to the farthest of its tile, the last one behind the box; -1 out
@@ -60,7 +71,7 @@ class FrameCells {
  private:
   const SampleView& view_;
   double near_, per_log_;
-  std::array<Eigen::Vector3d, 4> sides_;
+  std::array<Eigen::Vector3d, 4> sides_;  ///< unit normals of the frame's sides, inwards, in the world
 };
 
 /// A view that has a voxel in frame, and where.
@@ -70,7 +81,7 @@ struct Sighting {
 
 class Overlap {
  public:
-  Overlap(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box) {
+  Overlap(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box) : box_(box) {
     for (std::size_t n = 0; n < nodes.size(); ++n)
       for (const SampleView& view : nodes[n]) {
         frames_.emplace_back(view, box);
@@ -80,21 +91,25 @@ class Overlap {
                         std::vector<std::uint16_t>(kAcross * kAcross * (kDeep + 1), std::uint16_t{0}));
   }
 
-  /// What is said below takes the places of the box into account once they have been added and gathered.
+  /// Takes in a brick's places inside what is compared; by any number of threads. Once all are in, gather()
+  /// them.
   void add_brick(const LatticeFrame& frame, const Eigen::Vector3i& brick, const BrickMask& mask) {
-    for_each_voxel(frame, brick, mask, [&](int, int count, const std::vector<Sighting>& sightings) {
-      for (const Sighting& s : sightings) raise(most_behind_[s.view][s.cell], count);
-    });
+    for_each_voxel(frame, brick, mask,
+                   [&](int, const Eigen::Vector3d& centre, const std::vector<int>& views) {
+                     if (!box_.contains(centre)) return;
+                     std::vector<Sighting> sightings;
+                     const int count = sight(centre, views, std::numeric_limits<int>::max(), sightings);
+                     for (const Sighting& s : sightings) raise(most_behind_[s.view][s.cell], count);
+                   });
   }
   void gather() {
     for (std::vector<std::uint16_t>& cells : most_behind_)
       for (int tile = 0; tile < kAcross * kAcross; ++tile) {
         std::uint16_t* deep = cells.data() + tile * (kDeep + 1);
+        deep[kDeep - 1] = std::max(deep[kDeep - 1], deep[kDeep]);  // of its far side itself
         deep[kDeep] = 0;
-        for (int d = kDeep - 1; d >= 0; --d) {
-          deep[d] = std::max(deep[d], deep[d + 1]);
-          most_ = std::max(most_, deep[d]);
-        }
+        for (int d = kDeep - 2; d >= 0; --d) deep[d] = std::max(deep[d], deep[d + 1]);
+        most_ = std::max(most_, deep[0]);
       }
   }
 
@@ -103,11 +118,18 @@ class Overlap {
                         double min_overlap) const {
     const int fewest = std::min<int>(2, most_);
     BrickMask out;
-    for_each_voxel(frame, brick, mask, [&](int voxel, int count, const std::vector<Sighting>& sightings) {
-      double behind = 0;
-      for (const Sighting& s : sightings) behind += most_behind_[s.view][s.cell];
-      out[voxel] = count < fewest || count * static_cast<double>(sightings.size()) < min_overlap * behind;
-    });
+    for_each_voxel(
+        frame, brick, mask, [&](int voxel, const Eigen::Vector3d& centre, const std::vector<int>& views) {
+          std::vector<Sighting> sightings;
+          const int count = sight(centre, views, kEnoughNodes, sightings);
+          if (count >= kEnoughNodes) return;
+          double behind = 0;
+          for (const Sighting& s : sightings) behind += most_behind_[s.view][s.cell];
+          const double sighted = static_cast<double>(sightings.size());
+          out[voxel] = count == 0   ? box_.contains(centre) || hides_all(centre, frame.voxel_size, views)
+                       : behind > 0 ? count < fewest || count * sighted < min_overlap * behind
+                                    : box_.contains(centre) && count < fewest;
+        });
     return out;
   }
 
@@ -120,7 +142,30 @@ class Overlap {
     }
   }
 
-  /// visit(voxel, nodes that have its centre in frame, the views that do).
+  /// How many nodes have the point in frame, of those that `views` (ascending) belong to, and where; looks no
+  /// further once they are `enough`.
+  int sight(const Eigen::Vector3d& point, const std::vector<int>& views, int enough,
+            std::vector<Sighting>& sightings) const {
+    int count = 0, last_node = -1;
+    for (const int view : views) {
+      const int cell = frames_[view].cell(point);
+      if (cell < 0) continue;
+      sightings.push_back({view, cell});
+      if (node_of_[view] != last_node && ++count == enough) break;
+      last_node = node_of_[view];
+    }
+    return count;
+  }
+
+  /// Whether a voxel whose centre no frame holds reaches into some frame before all that is compared.
+  bool hides_all(const Eigen::Vector3d& centre, double voxel_size, const std::vector<int>& views) const {
+    return std::any_of(views.begin(), views.end(), [&](int view) {
+      return frames_[view].may_hold(centre, 0.5 * std::sqrt(3.0) * voxel_size) &&
+             frames_[view].is_before(centre);
+    });
+  }
+
+  /// visit(voxel, its centre, the views that may have it in frame).
   template <class Visit>
   void for_each_voxel(const LatticeFrame& frame, const Eigen::Vector3i& brick, const BrickMask& mask,
                       const Visit& visit) const {
@@ -132,25 +177,15 @@ class Overlap {
     std::vector<int> views;
     for (std::size_t v = 0; v < frames_.size(); ++v)
       if (frames_[v].may_hold(middle, radius)) views.push_back(static_cast<int>(v));
-    std::vector<Sighting> sightings;
-    for (int voxel = 0; voxel < kBrickVoxels; ++voxel) {
-      if (!mask[voxel]) continue;
-      const Eigen::Vector3d centre =
-          frame.voxel_centre(first + Eigen::Vector3i(voxel % kBrickSide, voxel / kBrickSide % kBrickSide,
-                                                     voxel / (kBrickSide * kBrickSide)));
-      sightings.clear();
-      int count = 0, last_node = -1;
-      for (const int view : views) {
-        const int cell = frames_[view].cell(centre);
-        if (cell < 0) continue;
-        sightings.push_back({view, cell});
-        if (node_of_[view] != last_node) ++count;
-        last_node = node_of_[view];
-      }
-      visit(voxel, count, sightings);
-    }
+    for (int voxel = 0; voxel < kBrickVoxels; ++voxel)
+      if (mask[voxel])
+        visit(voxel,
+              frame.voxel_centre(first + Eigen::Vector3i(voxel % kBrickSide, voxel / kBrickSide % kBrickSide,
+                                                         voxel / (kBrickSide * kBrickSide))),
+              views);
   }
 
+  const Eigen::AlignedBox3d box_;
   std::vector<FrameCells> frames_;
   std::vector<int> node_of_;  ///< ascending
   /// For each view and cell: the most nodes that have a place of the box in frame that is in the cell or
@@ -158,6 +193,12 @@ class Overlap {
   std::vector<std::vector<std::uint16_t>> most_behind_;
   std::uint16_t most_ = 0;
 };
+
+/// Rays at the frames' rims pass the box by and end behind it.
+Eigen::AlignedBox3d grown(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d half = 0.5 * kComparedPlaces * box.sizes();
+  return {box.center() - half, box.center() + half};
+}
 
 struct PlacedBrick {
   Eigen::Vector3i coord;
@@ -174,16 +215,20 @@ std::vector<PlacedBrick> bricks_of(const Topology& lattice) {
 
 }  // namespace
 
-std::int64_t drop_little_seen(const std::vector<SampleNode>& nodes, double min_overlap,
-                              const RunContext& context, std::vector<Topology>& lattices) {
-  const std::int64_t before = lattices[0].voxel_count();
-  Overlap overlap(nodes, lattices[0].frame().box());
-  std::vector<PlacedBrick> bricks = bricks_of(lattices[0]);
-  parallel_for(bricks.size(), context.thread_count(), [&](std::int64_t b, int) {
-    context.throw_if_cancelled();
-    overlap.add_brick(lattices[0].frame(), bricks[b].coord, bricks[b].mask);
-  });
+std::int64_t drop_little_seen(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box,
+                              double min_overlap, const RunContext& context,
+                              std::vector<Topology>& lattices) {
+  Overlap overlap(nodes, grown(box));
+  std::vector<PlacedBrick> bricks;
+  for (const Topology& lattice : lattices) {
+    bricks = bricks_of(lattice);
+    parallel_for(bricks.size(), context.thread_count(), [&](std::int64_t b, int) {
+      context.throw_if_cancelled();
+      overlap.add_brick(lattice.frame(), bricks[b].coord, bricks[b].mask);
+    });
+  }
   overlap.gather();
+  const std::int64_t before = lattices[0].voxel_count();
   for (Topology& lattice : lattices) {
     bricks = bricks_of(lattice);
     parallel_for(bricks.size(), context.thread_count(), [&](std::int64_t b, int) {

@@ -6,21 +6,28 @@
 /// make islands that hang before what they hide, above all before surfaces that shine. How many nodes have a
 /// place in their frames is known before anything is looked at.
 
+#include <cstdint>
 #include <vector>
 
 #include "roxel/base/run_context.h"
 #include "roxel/infer/sample_view.h"
+#include "roxel/volume/volume.h"
 
 namespace roxel {
 
-/// Removes the voxels whose centre fewer nodes have in frame than two, or than the share `min_overlap` (0 to
-/// 1) of the most that have a place behind it in the box (lattices[0]), as the mean over the rays to the
-/// voxel of all views that have it in frame. Where no two nodes share a place in the box, one is enough. What
-/// surrounds the box behind it stays: nothing there is seen better. Occlusion and masks do not count; rays
-/// are told apart to a 24th of the frame's sides, depths to a 32nd of the box's range in logarithm. The
-/// result does not depend on the number of threads. Returns how many of the box were removed. Throws
-/// Cancelled.
-std::int64_t drop_little_seen(const std::vector<SampleNode>& nodes, double min_overlap,
-                              const RunContext& context, std::vector<Topology>& lattices);
+/// So many nodes are enough anywhere: what stands before a wall and is in a dozen frames may be there.
+inline constexpr int kEnoughNodes = 12;
+/// Places are compared with those of a box so many times as large: rays at the rims of frames pass it by.
+inline constexpr double kComparedPlaces = 1.5;
+
+/// Removes the voxels that lie before places which more nodes have in frame: those whose centre fewer than
+/// two nodes have, or fewer than kEnoughNodes and than the share `min_overlap` (0 to 1) of the most that have
+/// one place at or behind it on the ray, inside `box` (world) grown by kComparedPlaces about its centre; as
+/// the mean over all views that have the voxel in frame, 0 where nothing of that box lies behind. Where no
+/// two nodes share a place there, one is enough. Occlusion and masks do not count; rays are told apart to a
+/// 24th of the frame's sides, depths to a 32nd of that box's range in logarithm. The result does not depend
+/// on the number of threads. Returns how many voxels of lattices[0] were removed. Throws Cancelled.
+std::int64_t drop_little_seen(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box,
+                              double min_overlap, const RunContext& context, std::vector<Topology>& lattices);
 
 }  // namespace roxel

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "roxel/base/error.h"
 #include "roxel/infer/infer_fixture.h"
 
@@ -14,6 +16,7 @@ using fixture::plan_of;
 using fixture::view_of;
 
 constexpr Stretch kRange{1, 60};
+const Eigen::AlignedBox3d kBox(Eigen::Vector3d(-4, -4, -4), Eigen::Vector3d(4, 4, 4));
 
 /// Ten nodes side by side that look along z at a box 8 wide: one has a place close to it in frame, all have
 /// the far end.
@@ -21,8 +24,7 @@ class LittleSeen : public ::testing::Test {
  protected:
   LittleSeen() {
     for (int n = 0; n < 10; ++n) nodes_.push_back({view_at(1.0 * n - 4.5)});
-    for (const LatticeFrame& frame :
-         nested_frames({Eigen::Vector3d(-4, -4, -4), Eigen::Vector3d(4, 4, 4)}, 0.25, 1)) {
+    for (const LatticeFrame& frame : nested_frames(kBox, 0.25, 1)) {
       lattices_.emplace_back(frame);
       const Eigen::Vector3i size = frame.size_in_bricks;
       for (int b = 0; b < size.prod(); ++b)
@@ -51,7 +53,7 @@ class LittleSeen : public ::testing::Test {
   }
   std::vector<Topology> dropped(double min_overlap, int threads = 1) const {
     std::vector<Topology> lattices = lattices_;
-    const std::int64_t gone = drop_little_seen(nodes_, min_overlap, RunContext(threads), lattices);
+    const std::int64_t gone = drop_little_seen(nodes_, kBox, min_overlap, RunContext(threads), lattices);
     EXPECT_EQ(lattices_[0].voxel_count() - gone, lattices[0].voxel_count());
     return lattices;
   }
@@ -114,6 +116,23 @@ TEST_F(LittleSeen, GoesBeforeTheBoxButNotBehindIt) {
   EXPECT_TRUE(left[1].contains(behind));
 }
 
+// However many have what lies behind: so may a post before a wall that a camera passes.
+TEST_F(LittleSeen, StaysWhereADozenNodesHaveIt) {
+  nodes_.clear();
+  for (int n = 0; n < 60; ++n) nodes_.push_back({view_at(0.2 * n - 5.9)});
+  const Eigen::Vector3d near_place(0.125, 0.125, -3.875);
+  ASSERT_GT(nodes_that_see(near_place), kEnoughNodes);
+  ASSERT_LT(nodes_that_see(near_place), 25);
+  EXPECT_TRUE(dropped(1)[0].contains(voxel_at(lattices_[0], near_place)));
+}
+
+TEST_F(LittleSeen, StaysBehindTheBoxThoughOneNodeAloneHasItInFrame) {
+  nodes_ = {nodes_[0], nodes_[9]};
+  const Eigen::Vector3d beside(7.75, 0.25, 5.25);
+  ASSERT_EQ(nodes_that_see(beside), 1);
+  EXPECT_TRUE(dropped(0.5)[1].contains(voxel_at(lattices_[1], beside)));
+}
+
 TEST_F(LittleSeen, IsWhatOneNodeAloneHasInFrame) {
   nodes_ = {nodes_[1], nodes_[4], nodes_[7]};
   const std::vector<Topology> left = dropped(1e-9);
@@ -158,7 +177,7 @@ TEST_F(LittleSeen, DoesNotDependOnThreads) {
 TEST_F(LittleSeen, StopsWhenCancelled) {
   RunContext context(2);
   context.cancel();
-  EXPECT_THROW(drop_little_seen(nodes_, 0.5, context, lattices_), Cancelled);
+  EXPECT_THROW(drop_little_seen(nodes_, kBox, 0.5, context, lattices_), Cancelled);
 }
 
 }  // namespace

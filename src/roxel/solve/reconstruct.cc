@@ -82,7 +82,8 @@ Volume first_volume(const Scene& scene, const std::vector<SampleNode>& samples,
   std::vector<Topology> lattices = reached_voxels(frames_of_first_level(scene, options), samples, context);
   if (options.min_overlap > 0) {
     const std::int64_t reached = lattices[0].voxel_count();
-    const std::int64_t gone = drop_little_seen(samples, options.min_overlap, context, lattices);
+    const std::int64_t gone =
+        drop_little_seen(samples, scene.bounds.box, options.min_overlap, context, lattices);
     if (gone > 0)
       notes.push_back("overlap: " + std::to_string(gone) + " of " + std::to_string(reached) +
                       " places left out, as few nodes have them in frame and many what lies behind");
