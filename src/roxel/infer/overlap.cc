@@ -81,7 +81,8 @@ struct Sighting {
 
 class Overlap {
  public:
-  Overlap(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box) : box_(box) {
+  Overlap(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box)
+      : box_(box), node_count_(static_cast<double>(nodes.size())) {
     for (std::size_t n = 0; n < nodes.size(); ++n)
       for (const SampleView& view : nodes[n]) {
         frames_.emplace_back(view, box);
@@ -98,7 +99,7 @@ class Overlap {
                    [&](int, const Eigen::Vector3d& centre, const std::vector<int>& views) {
                      if (!box_.contains(centre)) return;
                      std::vector<Sighting> sightings;
-                     const int count = sight(centre, views, std::numeric_limits<int>::max(), sightings);
+                     const int count = sight(centre, views, sightings);
                      for (const Sighting& s : sightings) raise(most_behind_[s.view][s.cell], count);
                    });
   }
@@ -121,13 +122,12 @@ class Overlap {
     for_each_voxel(
         frame, brick, mask, [&](int voxel, const Eigen::Vector3d& centre, const std::vector<int>& views) {
           std::vector<Sighting> sightings;
-          const int count = sight(centre, views, kEnoughNodes, sightings);
-          if (count >= kEnoughNodes) return;
+          const int count = sight(centre, views, sightings);
           double behind = 0;
           for (const Sighting& s : sightings) behind += most_behind_[s.view][s.cell];
-          const double sighted = static_cast<double>(sightings.size());
+          behind /= std::max<double>(1, sightings.size());
           out[voxel] = count == 0   ? box_.contains(centre) || hides_all(centre, frame.voxel_size, views)
-                       : behind > 0 ? count < fewest || count * sighted < min_overlap * behind
+                       : behind > 0 ? count < fewest || count < nodes_asked_for(behind, min_overlap)
                                     : box_.contains(centre) && count < fewest;
         });
     return out;
@@ -142,16 +142,22 @@ class Overlap {
     }
   }
 
-  /// How many nodes have the point in frame, of those that `views` (ascending) belong to, and where; looks no
-  /// further once they are `enough`.
-  int sight(const Eigen::Vector3d& point, const std::vector<int>& views, int enough,
+  /// Before a place that `behind` nodes have in frame.
+  double nodes_asked_for(double behind, double min_overlap) const {
+    const double share = min_overlap * behind;
+    return behind >= kNearlyAll * node_count_ ? share
+                                              : std::min<double>(kLessElsewhere * share, kEnoughNodes);
+  }
+
+  /// How many nodes have the point in frame, of those that `views` (ascending) belong to, and where.
+  int sight(const Eigen::Vector3d& point, const std::vector<int>& views,
             std::vector<Sighting>& sightings) const {
     int count = 0, last_node = -1;
     for (const int view : views) {
       const int cell = frames_[view].cell(point);
       if (cell < 0) continue;
       sightings.push_back({view, cell});
-      if (node_of_[view] != last_node && ++count == enough) break;
+      if (node_of_[view] != last_node) ++count;
       last_node = node_of_[view];
     }
     return count;
@@ -186,6 +192,7 @@ class Overlap {
   }
 
   const Eigen::AlignedBox3d box_;
+  const double node_count_;
   std::vector<FrameCells> frames_;
   std::vector<int> node_of_;  ///< ascending
   /// For each view and cell: the most nodes that have a place of the box in frame that is in the cell or

@@ -15,18 +15,24 @@
 
 namespace roxel {
 
-/// So many nodes are enough anywhere: what stands before a wall and is in a dozen frames may be there.
+/// A set of which this share of the nodes have one place in frame was taken of that place.
+inline constexpr double kNearlyAll = 0.9;
+/// Elsewhere less is asked for, by this factor: what stands before a wall that cameras pass is in as many
+/// frames as its share of the wall's distance;
+inline constexpr double kLessElsewhere = 0.6;
+/// and so many nodes are enough.
 inline constexpr int kEnoughNodes = 12;
 /// Places are compared with those of a box so many times as large: rays at the rims of frames pass it by.
 inline constexpr double kComparedPlaces = 1.5;
 
-/// Removes the voxels that lie before places which more nodes have in frame: those whose centre fewer than
-/// two nodes have, or fewer than kEnoughNodes and than the share `min_overlap` (0 to 1) of the most that have
-/// one place at or behind it on the ray, inside `box` (world) grown by kComparedPlaces about its centre; as
-/// the mean over all views that have the voxel in frame, 0 where nothing of that box lies behind. Where no
-/// two nodes share a place there, one is enough. Occlusion and masks do not count; rays are told apart to a
-/// 24th of the frame's sides, depths to a 32nd of that box's range in logarithm. The result does not depend
-/// on the number of threads. Returns how many voxels of lattices[0] were removed. Throws Cancelled.
+/// Removes voxels that lie before places which more nodes have in frame. With B the most nodes that have one
+/// place at or behind the voxel on the ray, inside `box` (world) grown by kComparedPlaces about its centre,
+/// as the mean over all views that have the voxel's centre in frame (0 where nothing of that box lies
+/// behind): those that fewer than two nodes have, or fewer than `min_overlap` (0 to 1) times B if B is nearly
+/// all, else than the lesser of kLessElsewhere times that and kEnoughNodes. Where no two nodes share a place,
+/// one is enough. Occlusion and masks do not count; rays are told apart to a 24th of the frame's sides,
+/// depths to a 32nd of that box's range in logarithm. The result does not depend on the number of threads.
+/// Returns how many voxels of lattices[0] were removed. Throws Cancelled.
 std::int64_t drop_little_seen(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box,
                               double min_overlap, const RunContext& context, std::vector<Topology>& lattices);
 

@@ -119,11 +119,26 @@ TEST_F(LittleSeen, GoesBeforeTheBoxButNotBehindIt) {
 // However many have what lies behind: so may a post before a wall that a camera passes.
 TEST_F(LittleSeen, StaysWhereADozenNodesHaveIt) {
   nodes_.clear();
-  for (int n = 0; n < 60; ++n) nodes_.push_back({view_at(0.2 * n - 5.9)});
+  for (int n = 0; n < 120; ++n) nodes_.push_back({view_at(0.2 * n - 11.9)});
   const Eigen::Vector3d near_place(0.125, 0.125, -3.875);
   ASSERT_GT(nodes_that_see(near_place), kEnoughNodes);
   ASSERT_LT(nodes_that_see(near_place), 25);
-  EXPECT_TRUE(dropped(1)[0].contains(voxel_at(lattices_[0], near_place)));
+  const Eigen::Vector3i voxel = voxel_at(lattices_[0], near_place);
+  EXPECT_TRUE(dropped(1)[0].contains(voxel));
+  // But not where all there are have the other.
+  nodes_.erase(nodes_.begin() + 85, nodes_.end());
+  nodes_.erase(nodes_.begin(), nodes_.begin() + 35);
+  EXPECT_FALSE(dropped(1)[0].contains(voxel));
+}
+
+TEST_F(LittleSeen, IsToBeInASmallerShareWhereNotAllHaveWhatLiesBehind) {
+  const Eigen::Vector3d near_place(0.125, 0.125, -3.875);
+  const Eigen::Vector3i voxel = voxel_at(lattices_[0], near_place);
+  ASSERT_EQ(nodes_that_see(near_place), 4);  // and ten what lies behind
+  EXPECT_FALSE(dropped(0.45)[0].contains(voxel));
+  for (const double far_away : {40, 50}) nodes_.push_back({view_at(far_away)});
+  EXPECT_TRUE(dropped(0.45)[0].contains(voxel));
+  EXPECT_FALSE(dropped(0.75)[0].contains(voxel));
 }
 
 TEST_F(LittleSeen, StaysBehindTheBoxThoughOneNodeAloneHasItInFrame) {

@@ -67,9 +67,10 @@ void add_volume(OptionTable<Options>& table) {
       .source("docs/volume.md; docs/background.md");
   table.add("min-overlap", &Options::min_overlap)
       .help(
-          "Leave out places that fewer nodes have in frame than this share of the most that have what lies "
-          "behind: "
-          "nothing hangs before the cameras where two photographs agree by chance; 0: none")
+          "Leave out places that fewer than two nodes have in frame, or than this share of the most that "
+          "have what "
+          "lies behind (less where those are not nearly all): nothing hangs before the cameras where a few "
+          "photographs agree by chance; 0: none")
       .range(0, 1)
       .source("docs/volume.md; measured on dtu-scan24 without masks");
   table.add("memory", &Options::memory)

@@ -30,7 +30,7 @@ struct ReconstructOptions {
   double tolerance = 1e-4;
   bool all_passes = false;
   SurroundChoice surround = SurroundChoice::kAuto;
-  double min_overlap = 0.25;
+  double min_overlap = 0.4;
   std::optional<double> memory;  ///< GiB that the process may hold; changes no result
 
   // How images are sampled
