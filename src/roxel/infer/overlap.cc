@@ -145,7 +145,7 @@ class Overlap {
   /// Before a place that `behind` nodes have in frame.
   double nodes_asked_for(double behind, double min_overlap) const {
     const double share = min_overlap * behind;
-    return behind >= kNearlyAll * node_count_ ? share
+    return behind >= kMostNodes * node_count_ ? share
                                               : std::min<double>(kLessElsewhere * share, kEnoughNodes);
   }
 

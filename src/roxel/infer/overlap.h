@@ -16,7 +16,7 @@
 namespace roxel {
 
 /// A set of which this share of the nodes have one place in frame was taken of that place.
-inline constexpr double kNearlyAll = 0.9;
+inline constexpr double kMostNodes = 2.0 / 3;
 /// Elsewhere less is asked for, by this factor: what stands before a wall that cameras pass is in as many
 /// frames as its share of the wall's distance;
 inline constexpr double kLessElsewhere = 0.6;

@@ -69,7 +69,7 @@ void add_volume(OptionTable<Options>& table) {
       .help(
           "Leave out places that fewer than two nodes have in frame, or than this share of the most that "
           "have what "
-          "lies behind (less where those are not nearly all): nothing hangs before the cameras where a few "
+          "lies behind (less where those are not two thirds): nothing hangs before the cameras where a few "
           "photographs agree by chance; 0: none")
       .range(0, 1)
       .source("docs/volume.md; measured on dtu-scan24 without masks");
@@ -92,7 +92,7 @@ void add_sampling(OptionTable<Options>& table) {
   table.add("samples-per-voxel", &Options::samples_per_voxel)
       .help("Samples across a voxel, along an axis")
       .range(0.25, 16)
-      .source("chosen for cost: 2 looks at up to four times as many samples (docs/rays.md)");
+      .source("2 takes twice the steps for half a point of depths (docs/rays.md)");
   table.add("interpolate", &Options::interpolate)
       .help("Interpolate the image at each voxel centre's projection")
       .source("a switch of the thesis's program; not measured here, and slower: rays march one by one");
