@@ -64,7 +64,9 @@ class FrameCells {
     if (!(at.x() >= 0 && at.x() < k.width && at.y() >= 0 && at.y() < k.height)) return -1;
     const int x = static_cast<int>(kAcross * at.x() / k.width);
     const int y = static_cast<int>(kAcross * at.y() / k.height);
-    const int deep = static_cast<int>(std::clamp(per_log_ * std::log(at.z() / near_), 0.0, double{kDeep}));
+    const int deep =
+        per_log_ > 0 ? static_cast<int>(std::clamp(per_log_ * std::log(at.z() / near_), 0.0, double{kDeep}))
+                     : kDeep;  // the box is behind the camera
     return (y * kAcross + x) * (kDeep + 1) + deep;
   }
 

@@ -30,9 +30,10 @@ inline constexpr double kComparedPlaces = 1.5;
 /// as the mean over all views that have the voxel's centre in frame (0 where nothing of that box lies
 /// behind): those that fewer than two nodes have, or fewer than `min_overlap` (0 to 1) times B if B is most
 /// of the nodes, else than the lesser of kLessElsewhere times that and kEnoughNodes. Where no two nodes share
-/// a place, one is enough. Occlusion and masks do not count; rays are told apart to a 24th of the frame's
-/// sides, depths to a 32nd of that box's range in logarithm. The result does not depend on the number of
-/// threads. Returns how many voxels of lattices[0] were removed. Throws Cancelled.
+/// a place, one is enough. What no frame holds the centre of goes in that box, and where it reaches into a
+/// frame nearer than all of it. Occlusion and masks do not count; rays are told apart to a 24th of the
+/// frame's sides, depths to a 32nd of that box's range in logarithm. The result does not depend on the number
+/// of threads. Returns how many voxels of lattices[0] were removed. Throws Cancelled.
 std::int64_t drop_little_seen(const std::vector<SampleNode>& nodes, const Eigen::AlignedBox3d& box,
                               double min_overlap, const RunContext& context, std::vector<Topology>& lattices);
 

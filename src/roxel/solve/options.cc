@@ -69,7 +69,8 @@ void add_volume(OptionTable<Options>& table) {
       .help(
           "Leave out places that fewer than two nodes have in frame, or than this share of the most that "
           "have what "
-          "lies behind (less where those are not two thirds): nothing hangs before the cameras where a few "
+          "lies behind (of less, where those are not two thirds of all): nothing hangs before the cameras "
+          "where a few "
           "photographs agree by chance; 0: none")
       .range(0, 1)
       .source("docs/volume.md; measured on dtu-scan24 without masks");
