@@ -178,6 +178,18 @@ TEST_F(LittleSeen, OneNodeIsEnoughWhereNoTwoShareAPlace) {
             count_kept(lattices_, [&](const Eigen::Vector3d& x) { return nodes_that_see(x) == 1; }));
 }
 
+TEST_F(LittleSeen, IsTheSameInTheBoxBesideACameraThatLooksAway) {
+  nodes_ = {nodes_[1], nodes_[4], nodes_[7]};
+  const std::vector<Topology> before = dropped(1e-9);
+  const PinholeCamera away = camera_at({0, 0, -9}, {0, 0, -20}, 16, 16, {0, 1, 0});
+  nodes_.push_back({view_of(away, plain_image(16, {50, 0, 0}), plan_of({0, 60}, 0))});
+  const std::vector<Topology> after = dropped(1e-9);
+  EXPECT_LT(after[0].voxel_count(), lattices_[0].voxel_count());
+  for_each_voxel(0, [&](const Eigen::Vector3i& ijk) {
+    EXPECT_EQ(after[0].contains(ijk), before[0].contains(ijk)) << ijk.transpose();
+  });
+}
+
 TEST_F(LittleSeen, DoesNotDependOnThreads) {
   const std::vector<Topology> one = dropped(0.5, 1);
   for (const int threads : {2, 4}) {
