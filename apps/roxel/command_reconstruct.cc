@@ -76,8 +76,8 @@ std::string pass_text(const PassRecord& record, const ReconstructOptions& option
   std::snprintf(text, sizeof text,
                 "level %d/%d pass %d/%d: %" PRId64
                 " voxels, log-likelihood %.4f, opacity change %.5f, %.1f s",
-                record.level, options.levels, record.pass, options.passes, record.active_voxels,
-                record.mean_log_likelihood, record.mean_opacity_change, record.seconds);
+                record.level, options.levels, record.pass, options.most_passes(record.level),
+                record.active_voxels, record.mean_log_likelihood, record.mean_opacity_change, record.seconds);
   return text;
 }
 

@@ -30,7 +30,6 @@ UPDATES = ["posterior", "roxels"]
 THESIS_ORDER = [("gaussian", "luv"), ("gaussian", "rgb"), ("exponential", "rgb")]
 SEED = 1
 OPACITY_THRESHOLD = 0.3
-CONFIDENCE_THRESHOLD = 0.05
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,9 +72,9 @@ WORLDS = {
     "shared-plane": World("the data set plane", data="plane", shared=True),
     "shared-head": World("the data set head", data="head", shared=True),
 }
-# The default choice once more at this resolution: nearer to the program's own of 256.
-FINE_RESOLUTION = 192
-FINE = ["plane", "head", "mug"]
+# The default choice once more at the program's own resolution.
+FINE_RESOLUTION = 256
+FINE = ["plane", "head", "mug", "shared-plane", "shared-head"]
 
 COLUMNS = [("voxels", "voxels"), ("close", "within 4 voxels %"), ("opacity", "weighted mean opacity %"),
            ("covered", "surface covered %"), ("rms", "RMS %"), ("depth_1", "depth within 1 voxel %"),
@@ -165,8 +164,8 @@ def measure(run, options, resolution=None):
     if make([*command, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet"], made, "summary.json") or anew:
         shutil.rmtree(metrics, ignore_errors=True)
     make([roxel, "eval", str(made), "--truth", str(data), "-o", str(metrics), "--opacity-threshold",
-          str(OPACITY_THRESHOLD), "--confidence-threshold", str(CONFIDENCE_THRESHOLD), "--distances",
-          f"{one_percent_of_diagonal(data):.6g}", *(["--section=" + world.through] if world.through else []), "--quiet"],
+          str(OPACITY_THRESHOLD), "--distances", f"{one_percent_of_diagonal(data):.6g}",
+          *(["--section=" + world.through] if world.through else []), "--quiet"],
          metrics, "metrics.json")
     return metrics
 
@@ -329,7 +328,7 @@ benchmarks/quality/tables.py --resolution {resolution}
 Worlds: `roxel synth WORLD --seed {seed}` with its other options at their defaults. Runs: `roxel reconstruct --update RULE --agreement
 AGREEMENT --color-space SPACE --resolution {resolution}` (the street: `--voxel-size 1`, light as its heading says), all else at its
 default, so masks are used and noise and scale are the space's own. `roxels` is the rule that the thesis prints, `posterior` is ours.
-Measured by `roxel eval --opacity-threshold {opacity} --confidence-threshold {confidence}`: one threshold of each for all
+Measured by `roxel eval --opacity-threshold {opacity}`: one threshold for all
 ([evaluation.md](../evaluation.md)). *RMS* is over the object; *surface covered* is the share of what two views see that has a counted voxel
 within one voxel; *F* is of the depth points at 1 % of the box's diagonal.
 
@@ -356,14 +355,13 @@ def world_part(world, results, sheets):
 
 
 def document(results, resolution, remarks="", fine={}, sheets=()):
-    lines = HEAD.format(resolution=resolution, seed=SEED, opacity=OPACITY_THRESHOLD,
-                        confidence=CONFIDENCE_THRESHOLD).splitlines() + [""]
+    lines = HEAD.format(resolution=resolution, seed=SEED, opacity=OPACITY_THRESHOLD).splitlines() + [""]
     for world in WORLDS:
         if any(run[0] == world for run in results):
             lines += world_part(world, results, sheets)
     if fine:
-        lines += [f"## The default choice at resolution {FINE_RESOLUTION}", "",
-                  "`posterior`, Gaussian Luv; all options but the resolution (256) are the program's own.", "", *fine_table(fine), ""]
+        lines += [f"## The default choice at the program's own resolution of {FINE_RESOLUTION}", "",
+                  "`posterior`, Gaussian Luv, with all options as they are.", "", *fine_table(fine), ""]
     lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results), ""]
     return "\n".join(lines) + (f"\n{remarks.strip()}\n" if remarks.strip() else "")
 

@@ -19,6 +19,7 @@ CHANGES = {
     "background": (BLACK, ["--background", "none"]),
     "background-color": (BLACK + ["--background", "constant"], ["--background-color", "0.2,0.1,0.4"]),
     "bounds": ([], ["--bounds", "-1,-1,-1,1,1,1"]),
+    "coarse-passes": ([], ["--coarse-passes", "1"]),
     "color-space": ([], ["--color-space", "hsv"]),
     "confidence-threshold": ([], ["--confidence-threshold", "0.5"]),
     "draft-passes": ([], ["--draft-passes", "0"]),

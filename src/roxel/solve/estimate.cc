@@ -214,8 +214,8 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
     const LevelEstimate estimate = estimate_level(scene, voxel_size, level == 0, load.rays, layers_of(scene));
     const double colour_marches = options.predictive ? 1.5 : 1;  // most nodes' own colours are kept
     core_ns += all_pixels * kLoadPixelNs;
-    const int drafts = std::min(options.draft_passes, options.passes - 1);
-    const double full_passes = options.passes - drafts * (1 - kDraftCost);
+    const double full_passes =
+        options.most_passes(level + 1) - options.most_drafts(level + 1) * (1 - kDraftCost);
     core_ns += full_passes * estimate.steps_per_pass * (colour_marches * kColorStepNs + kOpacityStepNs);
     cost.levels.push_back(estimate);
   }

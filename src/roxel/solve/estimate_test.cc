@@ -67,6 +67,14 @@ TEST(EstimateCost, GrowsWithWhatIsAskedFor) {
   const CostEstimate with_surround = estimate_cost(few, surrounded, options_at(64), 2);
   EXPECT_GT(with_surround.levels.back().voxels, base.levels.back().voxels);
   EXPECT_GT(with_surround.levels.back().steps_per_pass, base.levels.back().steps_per_pass);
+  ReconstructOptions coarse = options_at(64), finest = coarse, both = coarse;
+  coarse.coarse_passes = both.passes = finest.passes = 24;
+  finest.coarse_passes = 8;
+  const double of_coarse = estimated(few, coarse).seconds - base.seconds;
+  const double of_finest = estimated(few, finest).seconds - base.seconds;
+  EXPECT_GT(of_coarse, 0);
+  EXPECT_GT(of_finest, 0);
+  EXPECT_NEAR(estimated(few, both).seconds - base.seconds, of_coarse + of_finest, 1e-9);
 }
 
 TEST(EstimateCost, ThreadsDivideTimeAndAddScratch) {

@@ -37,6 +37,8 @@ constexpr IdleRule kIdleRules[] = {
      "colours are compared with the light of their neighbourhood; see --matching local"},
     {"sky-light", [](const Chosen&, const Scene& s) { return s.light.from != LightSource::kSky; },
      "no sky's light is divided out; see --illumination"},
+    {"coarse-passes", [](const Chosen& o, const Scene&) { return o.levels == 1; },
+     "there is but one level; see --levels"},
     {"tolerance", [](const Chosen& o, const Scene&) { return o.all_passes; },
      "with --all-passes it ends no level, and only says whether levels count as converged"},
 };

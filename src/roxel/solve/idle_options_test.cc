@@ -38,6 +38,7 @@ const IdleCase kIdleCases[] = {
     {"sky-light", [](auto& o) { o.sky_light = DomeLight::kMean; },
      [](auto&, auto& s) { s.light.from = LightSource::kGain; },
      [](auto&, auto& s) { s.light.from = LightSource::kSky; }},
+    {"coarse-passes", [](auto& o) { o.coarse_passes = 3; }, [](auto& o, auto&) { o.levels = 1; }, as_it_is},
     {"tolerance", [](auto& o) { o.tolerance = 0.01; }, [](auto& o, auto&) { o.all_passes = true; }, as_it_is},
 };
 

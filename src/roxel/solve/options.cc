@@ -44,6 +44,10 @@ void add_volume(OptionTable<Options>& table) {
       .help("Most passes a level")
       .range(1, 10000)
       .source("measured on plane and head");
+  table.add("coarse-passes", &Options::coarse_passes)
+      .help("Most passes of each level before the last, which are cheap; 0: as many as --passes")
+      .range(0, 10000)
+      .source("what more and fewer are worth: docs/passes.md");
   table.add("draft-passes", &Options::draft_passes)
       .help(
           "First passes of a level that look at samples of twice the size, a quarter as many; the last pass "

@@ -2,6 +2,7 @@
 /// Everything a user may choose about a reconstruction. Each field's name on the command line, range, unit
 /// and source stand once, in reconstruct_option_table().
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -25,8 +26,9 @@ struct ReconstructOptions {
   std::optional<double> voxel_size;  ///< of the finest level; otherwise from `resolution`
   int resolution = 256;              ///< voxels along the longest side, at the finest level
   int levels = 3;
-  int passes = 8;
-  int draft_passes = 3;  ///< of these, less one at most
+  int passes = 8;         ///< of a level, at most
+  int coarse_passes = 0;  ///< of each level before the last, at most; 0: as many as passes
+  int draft_passes = 3;   ///< of these, less one at most
   double tolerance = 1e-4;
   bool all_passes = false;
   SurroundChoice surround = SurroundChoice::kAuto;
@@ -73,6 +75,11 @@ struct ReconstructOptions {
   bool ray_weights = false;
   double opacity_threshold = 0.04;
   double confidence_threshold = 0.001;
+
+  /// The most passes of a level, from 1.
+  int most_passes(int level) const { return level < levels && coarse_passes > 0 ? coarse_passes : passes; }
+  /// How many of these are drafts.
+  int most_drafts(int level) const { return std::min(draft_passes, most_passes(level) - 1); }
 };
 
 /// The one table that the command line, JSON, the summary and the docs are made from.

@@ -23,19 +23,21 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Turns levels and passes into one fraction; a finer level is expected to cost four times the one before.
+/// Turns levels and passes into one fraction; a pass of a finer level is expected to cost four of the one
+/// before.
 class LevelProgress {
  public:
   LevelProgress(const ReconstructOptions& options, RunContext& context, double share)
       : options_(options), context_(context), share_(share) {
-    for (int level = 0; level < options.levels; ++level) total_ += std::pow(kGrowth, level);
+    for (int level = 1; level <= options.levels; ++level) total_ += cost_of(level);
   }
   void report(int level, int pass, double fraction_of_pass) {
     double before = 0;
-    for (int l = 1; l < level; ++l) before += std::pow(kGrowth, l - 1);
-    const double in_level = (pass - 1 + fraction_of_pass) / options_.passes;
-    Progress progress{"volume", level, options_.levels, pass, options_.passes, 0};
-    progress.fraction = share_ * passes_share() * (before + in_level * std::pow(kGrowth, level - 1)) / total_;
+    for (int l = 1; l < level; ++l) before += cost_of(l);
+    const int passes = options_.most_passes(level);
+    const double in_level = (pass - 1 + fraction_of_pass) / passes;
+    Progress progress{"volume", level, options_.levels, pass, passes, 0};
+    progress.fraction = share_ * passes_share() * (before + in_level * cost_of(level)) / total_;
     context_.report(progress);
   }
   /// Of the fit of colours, which follows the passes.
@@ -46,6 +48,7 @@ class LevelProgress {
 
  private:
   static constexpr double kGrowth = 4;
+  double cost_of(int level) const { return std::pow(kGrowth, level - 1) * options_.most_passes(level); }
   /// Of the time; the rest is the fit of colours.
   double passes_share() const { return options_.fit_colors ? 0.9 : 1.0; }
 
@@ -197,7 +200,7 @@ class LevelPasses {
            PassState& state, Scene& scene, Volume& volume, Summary& summary) {
     for (;;) {
       const bool draft = ++state.passes <= state.draft_passes;
-      const bool last = state.resting || state.passes == options_.passes;
+      const bool last = state.resting || state.passes == options_.most_passes(state.level);
       PassOptions pass = pass_options(scene, options_);
       pass.everywhere = first_ever_ && state.passes == 1;
       if (last && state.level == options_.levels) pass.prior.sharpness = options_.prior_sharpness;
@@ -303,7 +306,7 @@ void choose_gain(const Dataset& dataset, const PhotographLoader& load, const Vol
 PassState start_of_level(int level, const ReconstructOptions& options) {
   PassState state;
   state.level = level;
-  state.draft_passes = std::min(options.draft_passes, options.passes - 1);
+  state.draft_passes = options.most_drafts(level);
   return state;
 }
 

@@ -338,6 +338,36 @@ TEST(Reconstruct, ASharpenedPassDoesNotHideThatALevelRests) {
   EXPECT_TRUE(converged(1.2 * change).first);
 }
 
+TEST(Reconstruct, CoarsePassesAreThoseOfLevelsBeforeTheLast) {
+  const auto passes_by_level = [](int passes, int coarse_passes) {
+    ReconstructOptions options = cube_options();
+    options.levels = 3;
+    options.passes = passes;
+    options.coarse_passes = coarse_passes;
+    options.draft_passes = 3;
+    options.all_passes = true;
+    std::vector<Progress> reports;
+    RunContext context(1, [&](const Progress& progress) { reports.push_back(progress); });
+    const Reconstruction made = reconstruct(cube_dataset(6, 24), cube_loader(), options, context);
+    std::vector<std::pair<int, int>> levels(3);  // passes, and drafts of them
+    for (const PassRecord& pass : made.summary.passes) {
+      ++levels[pass.level - 1].first;
+      levels[pass.level - 1].second += pass.draft;
+    }
+    for (std::size_t i = 0; i < reports.size(); ++i) {
+      const Progress& report = reports[i];
+      EXPECT_LE(report.fraction, 1);
+      if (i > 0) EXPECT_GE(report.fraction, reports[i - 1].fraction);
+      if (report.stage == "volume") EXPECT_EQ(report.pass_limit, levels[report.level - 1].first);
+    }
+    return levels;
+  };
+  using Levels = std::vector<std::pair<int, int>>;
+  EXPECT_EQ(passes_by_level(5, 0), (Levels{{5, 3}, {5, 3}, {5, 3}}));
+  EXPECT_EQ(passes_by_level(5, 2), (Levels{{2, 1}, {2, 1}, {5, 3}}));
+  EXPECT_EQ(passes_by_level(2, 6), (Levels{{6, 3}, {6, 3}, {2, 1}}));
+}
+
 // What a run leaves is an EM step: the sums that merge adds up again.
 TEST(Reconstruct, TheLastPassOfALevelIsPlain) {
   const auto only_pass = [](double acceleration) {
