@@ -44,6 +44,7 @@ CHANGES = {
     "observation-weight": ([], ["--observation-weight", "6"]),
     "opacity-threshold": ([], ["--opacity-threshold", "0.3"]),
     "outlier": ([], ["--outlier", "0.01"]),
+    "outline-weight": ([], ["--outline-weight", "0.5"]),
     "passes": ([], ["--passes", "1"]),
     "predictive": ([], ["--no-predictive"]),
     "prior-opacity": ([], ["--prior-opacity", "0.1"]),

@@ -105,6 +105,13 @@ void add_sampling(OptionTable<Options>& table) {
       .help("Observations that one image makes of a voxel in the middle of the box")
       .above(0)
       .source("one image, one observation; chosen when 4 and 1 were compared, figures not kept");
+  table.add("outline-weight", &Options::outline_weight)
+      .help(
+          "Weight of background within six tenths of a voxel of an object's outline in its mask: below 1, "
+          "voxels "
+          "that stand out of an outline in part are not carved away")
+      .range(0, 1)
+      .source("what less is worth: docs/background.md");
 }
 
 void add_color(OptionTable<Options>& table) {

@@ -40,6 +40,7 @@ struct ReconstructOptions {
   double samples_per_voxel = 1;
   bool interpolate = false;
   double observation_weight = 1;
+  double outline_weight = 1;  ///< of background beside an object's outline, 0 to 1
 
   // Colour and its agreement
   ColorSpace color_space = ColorSpace::kLuv;

@@ -7,6 +7,7 @@
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 #include "roxel/dataset/box_visibility.h"
+#include "roxel/image/outline.h"
 #include "roxel/solve/background_choice.h"
 #include "roxel/solve/estimate.h"
 #include "roxel/solve/idle_options.h"
@@ -235,6 +236,9 @@ Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx) {
 
 namespace {
 
+/// How far beside an outline background is beside it, in voxels; at least a pixel.
+constexpr double kBesideOutline = 0.6;
+
 /// The first views, as many as there is room for.
 std::vector<bool> which_stay(const std::vector<SampleView>& views, const MemoryPlan& memory) {
   std::vector<bool> stay(views.size());
@@ -253,6 +257,7 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
                                      double voxel_size, const ReconstructOptions& options,
                                      const RunContext& context, SampleColors colors) {
   std::vector<SampleView> views(dataset.views.size());
+  std::vector<double> beside_px(dataset.views.size());
   SamplePlanOptions plan_options;
   plan_options.samples_per_voxel = options.samples_per_voxel;
   plan_options.adaptive = options.adaptive;
@@ -264,17 +269,20 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
     view.draft_plan = view.plan.coarser();
     const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
     view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
+    beside_px[v] = std::max(1.0, kBesideOutline * footprint);
   }
   const std::vector<bool> stay = which_stay(views, scene.memory);
   parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
     context.throw_if_cancelled();
     SampleView& view = views[v];
-    view.make_pyramid = [&dataset, &load, &scene, v, colors, finest = view.plan.finest_level,
+    view.make_pyramid = [&dataset, &load, &scene, v, colors, beside = beside_px[v],
+                         weight = options.outline_weight, finest = view.plan.finest_level,
                          root = view.draft_plan.root_level] {
       const Photograph photo = load(dataset.views[v]);
       return std::make_shared<const SamplePyramid>(
-          sample_image(dataset, static_cast<int>(v), photo, scene, colors), photo.valid, photo.foreground,
-          finest, root);
+          sample_image(dataset, static_cast<int>(v), photo, scene, colors),
+          lighter_beside_outline(photo.valid, photo.foreground, beside, weight), photo.foreground, finest,
+          root);
     };
     if (stay[v]) view.pyramid = view.make_pyramid();
   });
