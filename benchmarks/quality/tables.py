@@ -361,7 +361,7 @@ def document(results, resolution, remarks="", fine={}, sheets=()):
             lines += world_part(world, results, sheets)
     if fine:
         lines += [f"## The default choice at the program's own resolution of {FINE_RESOLUTION}", "",
-                  "`posterior`, Gaussian Luv, with all options as they are.", "", *fine_table(fine), ""]
+                  "`posterior`, Gaussian Luv, with all other options as they are; no belief propagation, no refinement.", "", *fine_table(fine), ""]
     lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results), ""]
     return "\n".join(lines) + (f"\n{remarks.strip()}\n" if remarks.strip() else "")
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+
+#include "roxel/base/error.h"
 
 namespace roxel {
 
@@ -48,6 +51,7 @@ Mask lighter_beside_outline(const Mask& valid, const Mask& foreground, double ra
       if (foreground.at(x, y) >= kObject && on_outline(foreground, x, y))
         disc.around(x, y, width, height,
                     [&](int u, int v) { beside.at(u, v) = foreground.at(u, v) < kObject; });
+  ROXEL_CHECK(valid.empty() || valid.data().size() == foreground.data().size());
   Mask result = valid.empty() ? Mask(width, height, 255) : valid;
   for (std::size_t i = 0; i < result.data().size(); ++i)
     if (beside.data()[i])

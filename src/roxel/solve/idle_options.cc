@@ -39,6 +39,9 @@ constexpr IdleRule kIdleRules[] = {
      "no sky's light is divided out; see --illumination"},
     {"coarse-passes", [](const Chosen& o, const Scene&) { return o.levels == 1; },
      "there is but one level; see --levels"},
+    {"outline-weight",
+     [](const Chosen&, const Scene& s) { return s.background.kind != BackgroundKind::kMask; },
+     "the background is not what masks leave; see --background"},
     {"tolerance", [](const Chosen& o, const Scene&) { return o.all_passes; },
      "with --all-passes it ends no level, and only says whether levels count as converged"},
 };

@@ -39,6 +39,9 @@ const IdleCase kIdleCases[] = {
      [](auto&, auto& s) { s.light.from = LightSource::kGain; },
      [](auto&, auto& s) { s.light.from = LightSource::kSky; }},
     {"coarse-passes", [](auto& o) { o.coarse_passes = 3; }, [](auto& o, auto&) { o.levels = 1; }, as_it_is},
+    {"outline-weight", [](auto& o) { o.outline_weight = 0.5; },
+     [](auto&, auto& s) { s.background.kind = BackgroundKind::kUnknown; },
+     [](auto&, auto& s) { s.background.kind = BackgroundKind::kMask; }},
     {"tolerance", [](auto& o) { o.tolerance = 0.01; }, [](auto& o, auto&) { o.all_passes = true; }, as_it_is},
 };
 

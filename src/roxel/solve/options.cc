@@ -107,9 +107,8 @@ void add_sampling(OptionTable<Options>& table) {
       .source("one image, one observation; chosen when 4 and 1 were compared, figures not kept");
   table.add("outline-weight", &Options::outline_weight)
       .help(
-          "Weight of background within six tenths of a voxel of an object's outline in its mask: below 1, "
-          "voxels "
-          "that stand out of an outline in part are not carved away")
+          "Where masks say what is background: its weight within six tenths of a voxel, at least a pixel, of "
+          "the object's outline; below 1, voxels that an outline cuts are not carved away")
       .range(0, 1)
       .source("what less is worth: docs/background.md");
 }

@@ -257,7 +257,7 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
                                      double voxel_size, const ReconstructOptions& options,
                                      const RunContext& context, SampleColors colors) {
   std::vector<SampleView> views(dataset.views.size());
-  std::vector<double> beside_px(dataset.views.size());
+  std::vector<double> beside_px(dataset.views.size(), 0.0);  // 0: background weighs the same everywhere
   SamplePlanOptions plan_options;
   plan_options.samples_per_voxel = options.samples_per_voxel;
   plan_options.adaptive = options.adaptive;
@@ -269,7 +269,8 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
     view.draft_plan = view.plan.coarser();
     const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
     view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
-    beside_px[v] = std::max(1.0, kBesideOutline * footprint);
+    if (scene.background.kind == BackgroundKind::kMask && options.outline_weight < 1)
+      beside_px[v] = std::max(1.0, kBesideOutline * footprint);
   }
   const std::vector<bool> stay = which_stay(views, scene.memory);
   parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
@@ -279,10 +280,11 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
                          weight = options.outline_weight, finest = view.plan.finest_level,
                          root = view.draft_plan.root_level] {
       const Photograph photo = load(dataset.views[v]);
+      const Mask lighter =
+          beside > 0 ? lighter_beside_outline(photo.valid, photo.foreground, beside, weight) : Mask();
       return std::make_shared<const SamplePyramid>(
           sample_image(dataset, static_cast<int>(v), photo, scene, colors),
-          lighter_beside_outline(photo.valid, photo.foreground, beside, weight), photo.foreground, finest,
-          root);
+          beside > 0 ? lighter : photo.valid, photo.foreground, finest, root);
     };
     if (stay[v]) view.pyramid = view.make_pyramid();
   });

@@ -205,6 +205,33 @@ TEST(MakeSamples, FollowTheLoaderNodesAndWeights) {
               3 * view.pixel_weight, 1e-6);
 }
 
+TEST(MakeSamples, BackgroundBesideOutlinesWeighsLessWhereMasksAreTheBackground) {
+  const Dataset dataset = cube_dataset(6, 48);
+  const PhotographLoader load = cube_loader(std::array{0.0f, 0.0f, 0.0f}, true);
+  ReconstructOptions options = surveyed_options();
+  options.adaptive = false;
+  Scene scene = survey(dataset, load, options, RunContext(1));
+  ASSERT_EQ(scene.background.kind, BackgroundKind::kMask);
+  const auto lost = [&](double voxel_size, double weight) {
+    options.outline_weight = weight;
+    const auto nodes = make_samples(dataset, load, scene, voxel_size, options, RunContext(1));
+    double pixels = 48.0 * 48.0;
+    const SampleView& view = nodes[0][0];
+    const int level = view.plan.finest_level;
+    for (int y = 0; y < view.pyramid->height(level); ++y)
+      for (int x = 0; x < view.pyramid->width(level); ++x)
+        pixels -= view.pyramid->at(level, x, y).valid * std::ldexp(1.0, 2 * level);
+    return pixels;
+  };
+  EXPECT_NEAR(lost(0.2, 1), 0, 1e-3);
+  const double one_pixel = lost(0.01, 0);  // of all around the cube
+  EXPECT_GT(one_pixel, 40);
+  EXPECT_NEAR(lost(0.01, 0.5), one_pixel / 2, 0.01 * one_pixel);
+  EXPECT_GT(lost(0.3, 0), 1.5 * one_pixel);
+  scene.background.kind = BackgroundKind::kUnknown;
+  EXPECT_NEAR(lost(0.2, 0), 0, 1e-3);
+}
+
 TEST(MakeSamples, SmallVoxelsNeverWeighPixelsMoreThanOnce) {
   const Dataset dataset = cube_dataset(6, 24);
   const ReconstructOptions options = surveyed_options();
