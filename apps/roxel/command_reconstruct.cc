@@ -71,13 +71,13 @@ std::vector<std::string> hash_images(const Dataset& dataset, const RunContext& c
   return hashes;
 }
 
-std::string pass_text(const PassRecord& record, const ReconstructOptions& options) {
+std::string pass_text(const PassRecord& record, int levels, int most_passes) {
   char text[256];
   std::snprintf(text, sizeof text,
                 "level %d/%d pass %d/%d: %" PRId64
                 " voxels, log-likelihood %.4f, opacity change %.5f, %.1f s",
-                record.level, options.levels, record.pass, options.most_passes(record.level),
-                record.active_voxels, record.mean_log_likelihood, record.mean_opacity_change, record.seconds);
+                record.level, levels, record.pass, most_passes, record.active_voxels,
+                record.mean_log_likelihood, record.mean_opacity_change, record.seconds);
   return text;
 }
 
@@ -193,12 +193,15 @@ class Run {
     hooks.checkpoint = [&](const CheckpointView& checkpoint) { checkpoints.offer(checkpoint); };
     skies_.add_to(hooks, run_, checkpoints);
     hooks.after_survey = [&](const Scene& scene) {
+      for (int level = 1; level <= options_.reconstruct.levels; ++level)
+        most_passes_.push_back(most_passes(scene, options_.reconstruct, level));
       for (const std::string& warning : scene.warnings) warn(options_.common, warning);
       if (options_.stages.depth && options_.stages.mesh)
         check_mesh_voxel_size(options_.mesh, scene.voxel_size);
     };
     hooks.after_pass = [&](const PassRecord& record) {
-      session_.display().line(pass_text(record, options_.reconstruct));
+      session_.display().line(
+          pass_text(record, options_.reconstruct.levels, most_passes_.at(record.level - 1)));
     };
     std::vector<StageRecord> before = std::move(made_.summary.stages);
     made_ = reconstruct(input_.dataset, input_.load, options_.reconstruct, session_.context(), hooks,
@@ -413,6 +416,7 @@ class Run {
   RunSkies skies_;
   double seconds_before_ = 0;  ///< of the parts before this one, of a run that is resumed
   std::filesystem::path run_;
+  std::vector<int> most_passes_;  ///< of each level
   Reconstruction made_;
   std::vector<ViewFigures> views_;
   std::vector<ReportView> report_views_;

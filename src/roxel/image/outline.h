@@ -5,10 +5,10 @@
 
 namespace roxel {
 
-/// `valid` (empty = all 255, or of the mask's size) where the background beside the object's outline weighs
-/// less: values of pixels below 128 in `foreground` are multiplied by `weight` (0 to 1) where the centre of a
-/// pixel of 128 or more is within `radius_px` (>= 0). A weight of 1, a radius below 1 and an empty
-/// `foreground` change nothing.
-Mask lighter_beside_outline(const Mask& valid, const Mask& foreground, double radius_px, double weight);
+/// `valid` (empty = all 255, or of the mask's size) times `weight` (0 to 1) at the pixels that the mask calls
+/// object in part, more than 2 % and less than 98 %: the object's outline passes through them. Such a pixel
+/// shows both object and background, and where in it either is cannot be told: its ray neither ends at the
+/// object nor passes it. A weight of 1, an empty `foreground` and masks of all or nothing change nothing.
+Mask lighter_on_outline(const Mask& valid, const Mask& foreground, double weight);
 
 }  // namespace roxel

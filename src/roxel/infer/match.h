@@ -22,7 +22,7 @@ struct MatchModel {
   Agreement agreement = Agreement::kGaussian;
   float noise_variance[3] = {9, 9, 9};  ///< diagonal of S_min, in the matching space
   float scale = 7.5f;                   ///< of the exponential and linear baselines, matching-space units
-  float evidence_half = 0.2f;           ///< w_0: evidence at which a voxel's own colour counts half
+  float evidence_half = 0.02f;          ///< w_0: evidence at which a voxel's own colour counts half
   float uninformative =
       0.000320427527f;    ///< p_0: likelihood where there is no evidence (unknown_color_likelihood)
   float outlier = 1e-7f;  ///< floor of every likelihood

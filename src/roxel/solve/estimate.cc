@@ -215,7 +215,7 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
     const double colour_marches = options.predictive ? 1.5 : 1;  // most nodes' own colours are kept
     core_ns += all_pixels * kLoadPixelNs;
     const double full_passes =
-        options.most_passes(level + 1) - options.most_drafts(level + 1) * (1 - kDraftCost);
+        most_passes(scene, options, level + 1) - most_drafts(scene, options, level + 1) * (1 - kDraftCost);
     core_ns += full_passes * estimate.steps_per_pass * (colour_marches * kColorStepNs + kOpacityStepNs);
     cost.levels.push_back(estimate);
   }

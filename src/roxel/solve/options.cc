@@ -45,7 +45,9 @@ void add_volume(OptionTable<Options>& table) {
       .range(1, 10000)
       .source("measured on plane and head");
   table.add("coarse-passes", &Options::coarse_passes)
-      .help("Most passes of each level before the last, which are cheap; 0: as many as --passes")
+      .help(
+          "Most passes of each level before the last, which are cheap; 0: as many as --passes, twice as many "
+          "where masks say what is background")
       .range(0, 10000)
       .source("what more and fewer are worth: docs/passes.md");
   table.add("draft-passes", &Options::draft_passes)
@@ -107,10 +109,11 @@ void add_sampling(OptionTable<Options>& table) {
       .source("one image, one observation; chosen when 4 and 1 were compared, figures not kept");
   table.add("outline-weight", &Options::outline_weight)
       .help(
-          "Where masks say what is background: its weight within six tenths of a voxel, at least a pixel, of "
-          "the object's outline; below 1, voxels that an outline cuts are not carved away")
+          "Where masks say what is background: weight of the pixels that the object's outline passes "
+          "through, "
+          "which show both; 1: as any other's")
       .range(0, 1)
-      .source("what less is worth: docs/background.md");
+      .source("docs/background.md; masks of all or nothing have no such pixels");
 }
 
 void add_color(OptionTable<Options>& table) {
@@ -161,7 +164,7 @@ void add_color(OptionTable<Options>& table) {
   table.add("evidence-half", &Options::evidence_half)
       .help("Colour evidence, in nodes, at which a voxel's own colour counts half")
       .range(0, 1000)
-      .source("chosen, not measured: a fifth of one witness (docs/passes.md)");
+      .source("measured with and without masks: docs/passes.md");
   table.add("predictive", &Options::predictive)
       .help("Compare a ray with what other nodes saw, leaving its own out")
       .source("docs/passes.md: without, clutter grows before every camera");

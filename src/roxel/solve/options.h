@@ -27,7 +27,7 @@ struct ReconstructOptions {
   int resolution = 256;              ///< voxels along the longest side, at the finest level
   int levels = 3;
   int passes = 8;         ///< of a level, at most
-  int coarse_passes = 0;  ///< of each level before the last, at most; 0: as many as passes
+  int coarse_passes = 0;  ///< of each level before the last, at most; 0: see most_passes
   int draft_passes = 3;   ///< of these, less one at most
   double tolerance = 1e-4;
   bool all_passes = false;
@@ -40,7 +40,7 @@ struct ReconstructOptions {
   double samples_per_voxel = 1;
   bool interpolate = false;
   double observation_weight = 1;
-  double outline_weight = 1;  ///< of background beside an object's outline, 0 to 1
+  double outline_weight = 0;  ///< of pixels that an object's outline passes through, 0 to 1
 
   // Colour and its agreement
   ColorSpace color_space = ColorSpace::kLuv;
@@ -50,7 +50,7 @@ struct ReconstructOptions {
   std::optional<double> agreement_scale;
   double outlier = 1e-7;
   std::optional<double> uninformative;
-  double evidence_half = 0.2;
+  double evidence_half = 0.02;
   bool predictive = true;
   bool fit_colors = true;
 
@@ -69,18 +69,13 @@ struct ReconstructOptions {
   // Opacity
   UpdateRule update = UpdateRule::kPosterior;
   double spatial_prior = 0.99;
-  double prior_sharpness = 2;
+  double prior_sharpness = 5;
   double prior_strength = 1;
   double prior_opacity = 0.02;
   double acceleration = 12;
   bool ray_weights = false;
   double opacity_threshold = 0.04;
   double confidence_threshold = 0.001;
-
-  /// The most passes of a level, from 1.
-  int most_passes(int level) const { return level < levels && coarse_passes > 0 ? coarse_passes : passes; }
-  /// How many of these are drafts.
-  int most_drafts(int level) const { return std::min(draft_passes, most_passes(level) - 1); }
 };
 
 /// The one table that the command line, JSON, the summary and the docs are made from.

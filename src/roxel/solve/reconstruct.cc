@@ -27,14 +27,14 @@ double seconds_since(Clock::time_point start) {
 /// before.
 class LevelProgress {
  public:
-  LevelProgress(const ReconstructOptions& options, RunContext& context, double share)
-      : options_(options), context_(context), share_(share) {
+  LevelProgress(const Scene& scene, const ReconstructOptions& options, RunContext& context, double share)
+      : scene_(scene), options_(options), context_(context), share_(share) {
     for (int level = 1; level <= options.levels; ++level) total_ += cost_of(level);
   }
   void report(int level, int pass, double fraction_of_pass) {
     double before = 0;
     for (int l = 1; l < level; ++l) before += cost_of(l);
-    const int passes = options_.most_passes(level);
+    const int passes = most_passes(scene_, options_, level);
     const double in_level = (pass - 1 + fraction_of_pass) / passes;
     Progress progress{"volume", level, options_.levels, pass, passes, 0};
     progress.fraction = share_ * passes_share() * (before + in_level * cost_of(level)) / total_;
@@ -48,10 +48,13 @@ class LevelProgress {
 
  private:
   static constexpr double kGrowth = 4;
-  double cost_of(int level) const { return std::pow(kGrowth, level - 1) * options_.most_passes(level); }
+  double cost_of(int level) const {
+    return std::pow(kGrowth, level - 1) * most_passes(scene_, options_, level);
+  }
   /// Of the time; the rest is the fit of colours.
   double passes_share() const { return options_.fit_colors ? 0.9 : 1.0; }
 
+  const Scene& scene_;
   const ReconstructOptions& options_;
   RunContext& context_;
   double share_;
@@ -200,7 +203,7 @@ class LevelPasses {
            PassState& state, Scene& scene, Volume& volume, Summary& summary) {
     for (;;) {
       const bool draft = ++state.passes <= state.draft_passes;
-      const bool last = state.resting || state.passes == options_.most_passes(state.level);
+      const bool last = state.resting || state.passes == most_passes(scene, options_, state.level);
       PassOptions pass = pass_options(scene, options_);
       pass.everywhere = first_ever_ && state.passes == 1;
       if (last && state.level == options_.levels) pass.prior.sharpness = options_.prior_sharpness;
@@ -303,10 +306,10 @@ void choose_gain(const Dataset& dataset, const PhotographLoader& load, const Vol
   scene.light.of_views = std::move(fit.of_views);
 }
 
-PassState start_of_level(int level, const ReconstructOptions& options) {
+PassState start_of_level(const Scene& scene, const ReconstructOptions& options, int level) {
   PassState state;
   state.level = level;
-  state.draft_passes = options.most_drafts(level);
+  state.draft_passes = most_drafts(scene, options, level);
   return state;
 }
 
@@ -321,15 +324,15 @@ class Levels {
         options_(options),
         context_(context),
         hooks_(hooks),
-        progress_(options, context, progress_share),
+        progress_(made.scene, options, context, progress_share),
         start_(start),
         made_(made) {}
 
   void run() {
     if (hooks_.daylight) daylight_ = *hooks_.daylight;
-    PassState state = start_of_level(1, options_);
+    PassState state = start_of_level(made_.scene, options_, 1);
     if (hooks_.resume) state = take_over();
-    for (;; state = start_of_level(state.level + 1, options_)) {
+    for (;; state = start_of_level(made_.scene, options_, state.level + 1)) {
       if (!state.level_done) run_level(state);
       finish_level(state);
       if (state.level == options_.levels) break;

@@ -216,6 +216,16 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
   return scene;
 }
 
+int most_passes(const Scene& scene, const ReconstructOptions& options, int level) {
+  if (level == options.levels) return options.passes;
+  if (options.coarse_passes > 0) return options.coarse_passes;
+  return scene.background.kind == BackgroundKind::kMask ? 2 * options.passes : options.passes;
+}
+
+int most_drafts(const Scene& scene, const ReconstructOptions& options, int level) {
+  return std::min(options.draft_passes, most_passes(scene, options, level) - 1);
+}
+
 std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options) {
   return nested_frames(scene.bounds.box, std::ldexp(scene.voxel_size, options.levels - 1),
                        scene.surround_count);
@@ -236,9 +246,6 @@ Stretch view_range(const Scene& scene, const Dataset& dataset, int view_idx) {
 
 namespace {
 
-/// How far beside an outline background is beside it, in voxels; at least a pixel.
-constexpr double kBesideOutline = 0.6;
-
 /// The first views, as many as there is room for.
 std::vector<bool> which_stay(const std::vector<SampleView>& views, const MemoryPlan& memory) {
   std::vector<bool> stay(views.size());
@@ -257,7 +264,6 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
                                      double voxel_size, const ReconstructOptions& options,
                                      const RunContext& context, SampleColors colors) {
   std::vector<SampleView> views(dataset.views.size());
-  std::vector<double> beside_px(dataset.views.size(), 0.0);  // 0: background weighs the same everywhere
   SamplePlanOptions plan_options;
   plan_options.samples_per_voxel = options.samples_per_voxel;
   plan_options.adaptive = options.adaptive;
@@ -269,22 +275,18 @@ std::vector<SampleNode> make_samples(const Dataset& dataset, const PhotographLoa
     view.draft_plan = view.plan.coarser();
     const double footprint = std::max(1.0, footprint_px(view.camera, scene, voxel_size, view.plan.range));
     view.pixel_weight = static_cast<float>(options.observation_weight / (footprint * footprint));
-    if (scene.background.kind == BackgroundKind::kMask && options.outline_weight < 1)
-      beside_px[v] = std::max(1.0, kBesideOutline * footprint);
   }
+  const double outline_weight = scene.background.kind == BackgroundKind::kMask ? options.outline_weight : 1.0;
   const std::vector<bool> stay = which_stay(views, scene.memory);
   parallel_for(dataset.views.size(), context.thread_count(), [&](std::int64_t v, int) {
     context.throw_if_cancelled();
     SampleView& view = views[v];
-    view.make_pyramid = [&dataset, &load, &scene, v, colors, beside = beside_px[v],
-                         weight = options.outline_weight, finest = view.plan.finest_level,
+    view.make_pyramid = [&dataset, &load, &scene, v, colors, outline_weight, finest = view.plan.finest_level,
                          root = view.draft_plan.root_level] {
       const Photograph photo = load(dataset.views[v]);
-      const Mask lighter =
-          beside > 0 ? lighter_beside_outline(photo.valid, photo.foreground, beside, weight) : Mask();
       return std::make_shared<const SamplePyramid>(
           sample_image(dataset, static_cast<int>(v), photo, scene, colors),
-          beside > 0 ? lighter : photo.valid, photo.foreground, finest, root);
+          lighter_on_outline(photo.valid, photo.foreground, outline_weight), photo.foreground, finest, root);
     };
     if (stay[v]) view.pyramid = view.make_pyramid();
   });

@@ -33,6 +33,13 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
 /// `load` is given). For `roxel info` and dry runs, and the first step of survey().
 Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options);
 
+/// The most passes of a level, from 1. Levels before the last have options.coarse_passes; where that is 0 as
+/// many as the last, and twice as many where masks say what is background.
+int most_passes(const Scene& scene, const ReconstructOptions& options, int level);
+
+/// How many of these are drafts.
+int most_drafts(const Scene& scene, const ReconstructOptions& options, int level);
+
 /// The frames of the coarsest level's lattices: box first, then surround.
 std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options);
 

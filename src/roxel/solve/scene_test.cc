@@ -205,16 +205,16 @@ TEST(MakeSamples, FollowTheLoaderNodesAndWeights) {
               3 * view.pixel_weight, 1e-6);
 }
 
-TEST(MakeSamples, BackgroundBesideOutlinesWeighsLessWhereMasksAreTheBackground) {
+TEST(MakeSamples, PixelsOnOutlinesWeighLessWhereMasksAreTheBackground) {
   const Dataset dataset = cube_dataset(6, 48);
   const PhotographLoader load = cube_loader(std::array{0.0f, 0.0f, 0.0f}, true);
   ReconstructOptions options = surveyed_options();
   options.adaptive = false;
   Scene scene = survey(dataset, load, options, RunContext(1));
   ASSERT_EQ(scene.background.kind, BackgroundKind::kMask);
-  const auto lost = [&](double voxel_size, double weight) {
+  const auto lost = [&](double weight) {
     options.outline_weight = weight;
-    const auto nodes = make_samples(dataset, load, scene, voxel_size, options, RunContext(1));
+    const auto nodes = make_samples(dataset, load, scene, 0.01, options, RunContext(1));
     double pixels = 48.0 * 48.0;
     const SampleView& view = nodes[0][0];
     const int level = view.plan.finest_level;
@@ -223,13 +223,35 @@ TEST(MakeSamples, BackgroundBesideOutlinesWeighsLessWhereMasksAreTheBackground) 
         pixels -= view.pyramid->at(level, x, y).valid * std::ldexp(1.0, 2 * level);
     return pixels;
   };
-  EXPECT_NEAR(lost(0.2, 1), 0, 1e-3);
-  const double one_pixel = lost(0.01, 0);  // of all around the cube
-  EXPECT_GT(one_pixel, 40);
-  EXPECT_NEAR(lost(0.01, 0.5), one_pixel / 2, 0.01 * one_pixel);
-  EXPECT_GT(lost(0.3, 0), 1.5 * one_pixel);
+  EXPECT_NEAR(lost(1), 0, 1e-3);
+  const double outline = lost(0);  // all around the cube
+  EXPECT_GT(outline, 40);
+  EXPECT_LT(outline, 300);
+  EXPECT_NEAR(lost(0.5), outline / 2, 0.01 * outline);
   scene.background.kind = BackgroundKind::kUnknown;
-  EXPECT_NEAR(lost(0.2, 0), 0, 1e-3);
+  EXPECT_NEAR(lost(0), 0, 1e-3);
+}
+
+TEST(MostPasses, CoarseLevelsHaveTheirOwnAndMasksDoubleThem) {
+  ReconstructOptions options;
+  options.levels = 3;
+  options.passes = 5;
+  options.draft_passes = 3;
+  Scene scene;
+  scene.background.kind = BackgroundKind::kUnknown;
+  const auto passes = [&] {
+    std::vector<int> all;
+    for (int level = 1; level <= 3; ++level) all.push_back(most_passes(scene, options, level));
+    return all;
+  };
+  EXPECT_EQ(passes(), (std::vector{5, 5, 5}));
+  EXPECT_EQ(most_drafts(scene, options, 1), 3);
+  scene.background.kind = BackgroundKind::kMask;
+  EXPECT_EQ(passes(), (std::vector{10, 10, 5}));
+  options.coarse_passes = 2;
+  EXPECT_EQ(passes(), (std::vector{2, 2, 5}));
+  EXPECT_EQ(most_drafts(scene, options, 1), 1);
+  EXPECT_EQ(most_drafts(scene, options, 3), 3);
 }
 
 TEST(MakeSamples, SmallVoxelsNeverWeighPixelsMoreThanOnce) {
