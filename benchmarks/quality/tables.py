@@ -4,7 +4,7 @@
     tables.py [--roxel PROGRAM] [--work DIR] [--docs DIR] [--resolution N] [--only PATTERN] [--write-only]
 
 Makes each world with a fixed seed, reconstructs it with every choice of agreement, colour space and update
-rule, measures all at the same two thresholds, and writes tables.md, tables.csv and pictures. Runs that the
+rule, measures all at the same threshold of opacity, and writes tables.md, tables.csv and pictures. Runs that the
 work folder has already, made by the same command, are not made again. The same for the data sets plane and head
 of ROXEL_TEST_DATA, where that is set: figures only.
 """

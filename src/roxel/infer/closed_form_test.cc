@@ -268,6 +268,7 @@ TEST(RunPass, PredictionComparesWithTheOtherNode) {
     PassOptions options;
     options.predictive = predictive;
     options.everywhere = true;
+    options.opacity.model.evidence_half = 0.2f;
     options.opacity.model.uninformative = 0.001f;
     options.opacity.background.kind = BackgroundKind::kNone;
     const std::vector<SampleNode> nodes{node({4.5, 4.5, -20}, red), node({-20, 4.5, 4.5}, second)};

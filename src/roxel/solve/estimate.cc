@@ -19,10 +19,12 @@ namespace {
 // Measured on plane, head, templeSparseRing and dtu-scan24 (with and without masks), at 64 to 256 voxels.
 constexpr double kSheetLayers = 22;
 constexpr double kInsideFactor = 4;  ///< times that, around cameras that stand in the box (courtyard)
+constexpr double kFogFactor =
+    2.3;  ///< times that, where the background is not known (dtu-scan24 without masks)
 constexpr double kCrossedShare = 0.5;
 constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
 constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level
-constexpr double kSurroundShare = 0.15;      ///< of the box's voxels, for each surround lattice
+constexpr double kSurroundShare = 0.6;       ///< of the box's voxels, for each surround lattice (a room)
 constexpr double kSurroundSteps = 4;         ///< more steps a ray for each surround lattice
 constexpr double kRaysPerSample = 1.15;      ///< finest samples, and the coarser ones they come from
 
@@ -139,7 +141,10 @@ double largest_image_of(const Dataset& dataset) {
   return largest;
 }
 
-double layers_of(const Scene& scene) { return kSheetLayers * (scene.seen_from_inside ? kInsideFactor : 1); }
+double layers_of(const Scene& scene) {
+  const double fog = scene.surround_count > 0 ? kFogFactor : 1;
+  return kSheetLayers * (scene.seen_from_inside ? kInsideFactor : fog);
+}
 
 double level_voxel_size(const Scene& scene, const ReconstructOptions& options, int level) {
   return std::ldexp(scene.voxel_size, options.levels - 1 - level);
