@@ -1,7 +1,7 @@
 #include "roxel/image/outline.h"
 
+#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 
 #include "roxel/base/error.h"
@@ -12,17 +12,26 @@ namespace {
 
 constexpr std::uint8_t kBackground = 5, kObject = 250;  ///< at most, at least; files of masks are not exact
 
+/// Whether one of the eight pixels around is all object's.
+bool beside_object(const Mask& foreground, int x, int y) {
+  for (int v = std::max(y - 1, 0); v <= std::min(y + 1, foreground.height() - 1); ++v)
+    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, foreground.width() - 1); ++u)
+      if (foreground.at(u, v) >= kObject) return true;
+  return false;
+}
+
 }  // namespace
 
 Mask lighter_on_outline(const Mask& valid, const Mask& foreground, double weight) {
   if (foreground.empty() || weight == 1) return valid;
   Mask result = valid.empty() ? Mask(foreground.width(), foreground.height(), 255) : valid;
   ROXEL_CHECK(result.width() == foreground.width() && result.height() == foreground.height());
-  for (std::size_t i = 0; i < result.data().size(); ++i) {
-    const std::uint8_t share = foreground.data()[i];
-    if (share > kBackground && share < kObject)
-      result.data()[i] = static_cast<std::uint8_t>(std::lround(weight * result.data()[i]));
-  }
+  for (int y = 0; y < foreground.height(); ++y)
+    for (int x = 0; x < foreground.width(); ++x) {
+      const std::uint8_t share = foreground.at(x, y);
+      if (share > kBackground && share < kObject && beside_object(foreground, x, y))
+        result.at(x, y) = static_cast<std::uint8_t>(std::lround(weight * result.at(x, y)));
+    }
   return result;
 }
 

@@ -58,11 +58,19 @@ TEST(LighterOnOutline, NoiseOfAFileIsNoOutline) {
   EXPECT_EQ(made.data(), Mask(kWidth, kHeight, 255).data());
 }
 
+TEST(LighterOnOutline, WhatIsThinnerThanAPixelKeepsItsPixels) {
+  Mask wire(kWidth, kHeight, 0);
+  for (int y = 0; y < kHeight; ++y) wire.at(7, y) = wire.at(8, y) = 120;
+  EXPECT_EQ(lighter_on_outline({}, wire, 0).data(), Mask(kWidth, kHeight, 255).data());
+}
+
 TEST(LighterOnOutline, ScalesWhatIsValid) {
-  Mask object(3, 1, 128), valid(3, 1, 100);
-  object.at(0, 0) = 255;
+  Mask object(4, 2, 128), valid(4, 2, 100);
+  object.at(1, 0) = 255;
   valid.at(2, 0) = 0;
-  EXPECT_EQ(lighter_on_outline(valid, object, 0.3).data(), (std::vector<std::uint8_t>{100, 30, 0}));
+  const std::vector<std::uint8_t> made{30, 100, 0,  100,  //
+                                       30, 30,  30, 100};
+  EXPECT_EQ(lighter_on_outline(valid, object, 0.3).data(), made);
 }
 
 TEST(LighterOnOutline, ChangesNothingWithoutMaskOrLessWeight) {

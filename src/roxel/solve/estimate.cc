@@ -19,8 +19,7 @@ namespace {
 // Measured on plane, head, templeSparseRing and dtu-scan24 (with and without masks), at 64 to 256 voxels.
 constexpr double kSheetLayers = 22;
 constexpr double kInsideFactor = 4;  ///< times that, around cameras that stand in the box (courtyard)
-constexpr double kFogFactor =
-    2.3;  ///< times that, where the background is not known (dtu-scan24 without masks)
+constexpr double kFogFactor = 2.3;   ///< times that, where there is a surround (dtu-scan24 without masks)
 constexpr double kCrossedShare = 0.5;
 constexpr double kFilledShare = 0.9;         ///< of the box's cells, at most
 constexpr double kFirstSurroundShare = 0.3;  ///< of a surround lattice's cells, in the first level

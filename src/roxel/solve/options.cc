@@ -47,7 +47,7 @@ void add_volume(OptionTable<Options>& table) {
   table.add("coarse-passes", &Options::coarse_passes)
       .help(
           "Most passes of each level before the last, which are cheap; 0: as many as --passes, twice as many "
-          "where masks say what is background")
+          "where masks of objects say what is background")
       .range(0, 10000)
       .source("what more and fewer are worth: docs/passes.md");
   table.add("draft-passes", &Options::draft_passes)
@@ -109,9 +109,8 @@ void add_sampling(OptionTable<Options>& table) {
       .source("one image, one observation; chosen when 4 and 1 were compared, figures not kept");
   table.add("outline-weight", &Options::outline_weight)
       .help(
-          "Where masks say what is background: weight of the pixels that the object's outline passes "
-          "through, "
-          "which show both; 1: as any other's")
+          "Where masks say what is background: weight of pixels on the object's outline, which "
+          "show both; 1: as any other's")
       .range(0, 1)
       .source("docs/background.md; masks of all or nothing have no such pixels");
 }

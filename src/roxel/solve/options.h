@@ -2,7 +2,6 @@
 /// Everything a user may choose about a reconstruction. Each field's name on the command line, range, unit
 /// and source stand once, in reconstruct_option_table().
 
-#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -26,9 +25,9 @@ struct ReconstructOptions {
   std::optional<double> voxel_size;  ///< of the finest level; otherwise from `resolution`
   int resolution = 256;              ///< voxels along the longest side, at the finest level
   int levels = 3;
-  int passes = 8;         ///< of a level, at most
+  int passes = 8;         ///< of the last level, at most; see most_passes
   int coarse_passes = 0;  ///< of each level before the last, at most; 0: see most_passes
-  int draft_passes = 3;   ///< of these, less one at most
+  int draft_passes = 3;   ///< of each level's, less one at most
   double tolerance = 1e-4;
   bool all_passes = false;
   SurroundChoice surround = SurroundChoice::kAuto;

@@ -219,7 +219,9 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
 int most_passes(const Scene& scene, const ReconstructOptions& options, int level) {
   if (level == options.levels) return options.passes;
   if (options.coarse_passes > 0) return options.coarse_passes;
-  return scene.background.kind == BackgroundKind::kMask ? 2 * options.passes : options.passes;
+  const bool of_objects =
+      scene.background.kind == BackgroundKind::kMask && scene.surround_count == 0 && !scene.seen_from_inside;
+  return of_objects ? 2 * options.passes : options.passes;
 }
 
 int most_drafts(const Scene& scene, const ReconstructOptions& options, int level) {

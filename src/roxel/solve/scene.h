@@ -34,7 +34,8 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
 Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options);
 
 /// The most passes of a level, from 1. Levels before the last have options.coarse_passes; where that is 0 as
-/// many as the last, and twice as many where masks say what is background.
+/// many as the last, and twice as many where masks of objects, not of the sky, say what is background: where
+/// cameras stand in the box or rays go on beyond it, more passes there do harm (docs/passes.md).
 int most_passes(const Scene& scene, const ReconstructOptions& options, int level);
 
 /// How many of these are drafts.

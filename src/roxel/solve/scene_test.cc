@@ -226,7 +226,7 @@ TEST(MakeSamples, PixelsOnOutlinesWeighLessWhereMasksAreTheBackground) {
   EXPECT_NEAR(lost(1), 0, 1e-3);
   const double outline = lost(0);  // all around the cube
   EXPECT_GT(outline, 40);
-  EXPECT_LT(outline, 300);
+  EXPECT_LT(outline, 200);
   EXPECT_NEAR(lost(0.5), outline / 2, 0.01 * outline);
   scene.background.kind = BackgroundKind::kUnknown;
   EXPECT_NEAR(lost(0), 0, 1e-3);
@@ -248,6 +248,12 @@ TEST(MostPasses, CoarseLevelsHaveTheirOwnAndMasksDoubleThem) {
   EXPECT_EQ(most_drafts(scene, options, 1), 3);
   scene.background.kind = BackgroundKind::kMask;
   EXPECT_EQ(passes(), (std::vector{10, 10, 5}));
+  scene.seen_from_inside = true;
+  EXPECT_EQ(passes(), (std::vector{5, 5, 5}));
+  scene.seen_from_inside = false;
+  scene.surround_count = 3;
+  EXPECT_EQ(passes(), (std::vector{5, 5, 5}));
+  scene.surround_count = 0;
   options.coarse_passes = 2;
   EXPECT_EQ(passes(), (std::vector{2, 2, 5}));
   EXPECT_EQ(most_drafts(scene, options, 1), 1);
