@@ -41,7 +41,7 @@ void add_volume(OptionTable<Options>& table) {
       .range(1, 16)
       .source("[Jethwa04] section 5.2.2");
   table.add("passes", &Options::passes)
-      .help("Most passes a level")
+      .help("Most passes of the last level; of those before: --coarse-passes")
       .range(1, 10000)
       .source("measured on plane and head");
   table.add("coarse-passes", &Options::coarse_passes)
@@ -109,8 +109,8 @@ void add_sampling(OptionTable<Options>& table) {
       .source("one image, one observation; chosen when 4 and 1 were compared, figures not kept");
   table.add("outline-weight", &Options::outline_weight)
       .help(
-          "Where masks say what is background: weight of pixels on the object's outline, which "
-          "show both; 1: as any other's")
+          "Where masks say what is background: weight of pixels on the object's outline, which show both; 1: "
+          "as any other's")
       .range(0, 1)
       .source("docs/background.md; masks of all or nothing have no such pixels");
 }
