@@ -17,7 +17,7 @@ import sys
 import tables
 
 LEVELS = [1, 2, 3]                # figure 5.6: the head after each level, the last at FINEST voxels
-FINEST = 96
+FINEST = 256
 STREET_VOXELS_M = [4, 2, 1]       # figure 8.25
 STREET_PASSES = [1, 3, 8]
 BEST = ("posterior", "gaussian", "luv")
@@ -97,18 +97,12 @@ def depth_of(part, options):
     before = metrics_before.with_name(tables.run_name(run))
     data, _ = tables.data_of(part, options)
     after = options.work / "figures" / (part + "-depth")
-    stamp = after.with_name(after.name + ".command")
-    command = quiet(options, "depth", after, *DEPTHS[part][1])
-    if not (after / "summary.json").exists() or not stamp.exists() or stamp.read_text() != " ".join(command):
-        shutil.rmtree(after, ignore_errors=True)
-        shutil.copytree(before, after)
-        print(" ".join(command), flush=True)
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        if part == "mug":
-            subprocess.run(quiet(options, "mesh", after), check=True, stdout=subprocess.DEVNULL)
-        stamp.write_text(" ".join(command))
+    made = tables.make(quiet(options, "depth", after, *DEPTHS[part][1]), after, "summary.json",
+                       lambda folder: shutil.copytree(before, folder))
+    if part == "mug" and made:
+        subprocess.run(quiet(options, "mesh", after), check=True, stdout=subprocess.DEVNULL)
     metrics = after.with_name(after.name + "-metrics")
-    run_again(options, metrics, "metrics.json", ["eval", after, "--truth", data, "-o", metrics])
+    run_again(options, metrics, "metrics.json", ["eval", after, "--truth", data, "-o", metrics], made)
     return before, after, metrics
 
 

@@ -34,7 +34,7 @@ class Page(unittest.TestCase):
         self.assertTrue(page.endswith("## By hand\n\nWhy.\n"))
 
     def test_finest_level_is_that_of_the_tables(self):
-        self.assertEqual([figures.voxels_of(level) for level in figures.LEVELS], [24, 48, 96])
+        self.assertEqual([figures.voxels_of(level) for level in figures.LEVELS], [64, 128, 256])
 
 
 if __name__ == "__main__":

@@ -5,14 +5,16 @@
 
 Makes each world with a fixed seed, reconstructs it with every choice of agreement, colour space and update
 rule, measures all at the same threshold of opacity, and writes tables.md, tables.csv and pictures. Runs that the
-work folder has already, made by the same command, are not made again. The same for the data sets plane and head
-of ROXEL_TEST_DATA, where that is set: figures only.
+work folder has already, made by the same program and command, are not made again. The same for the data sets
+plane and head of ROXEL_TEST_DATA, where that is set: figures only. Last, the still life in its room, without masks.
 """
 
 import argparse
 import csv
 import dataclasses
 import fnmatch
+import functools
+import hashlib
 import json
 import math
 import os
@@ -24,8 +26,8 @@ import subprocess
 import sys
 import time
 
-CHOICES = [("exponential", "rgb"), ("gaussian", "rgb"), ("gaussian", "luv"), ("exponential", "luv")]
-UPDATES = ["posterior", "roxels"]
+CHOICES = [("exponential", "srgb"), ("exponential", "rgb"), ("gaussian", "rgb"), ("gaussian", "luv"), ("exponential", "luv")]
+RULES = {"posterior": ("--update", "posterior"), "roxels": ("--update", "roxels", "--no-predictive", "--outlier", "0")}
 # The order that the thesis finds, best first.
 THESIS_ORDER = [("gaussian", "luv"), ("gaussian", "rgb"), ("exponential", "rgb")]
 SEED = 1
@@ -39,7 +41,7 @@ class World:
     data: str = ""                 # the world that is made; empty: the part's own name
     size: tuple = ()               # options that say how fine voxels are; empty: --resolution
     light: tuple = ()              # further options of reconstruct; "SKY" is the folder of the world's skies
-    section: str = "section_x"
+    sections: tuple = ("section_x",)
     through: str = ""              # point of the sections; empty: the middle of the box
     view: str = ""                 # image whose renders are shown; empty: none
     updates: tuple = ("posterior", "roxels")
@@ -50,7 +52,7 @@ class World:
     shared: bool = False           # a data set of ROXEL_TEST_DATA
 
 
-STREET = {"data": "street", "size": ("--voxel-size", "1"), "section": "section_z", "through": "-1,0,5",
+STREET = {"data": "street", "size": ("--voxel-size", "1"), "sections": ("section_z",), "through": "-1,0,5",
           "view": "n03_04", "choices": tuple(THESIS_ORDER[::-1])}
 STREET_FIGURES = "8.20, 8.22, 8.27, 8.30 to 8.32"
 WORLDS = {
@@ -58,7 +60,7 @@ WORLDS = {
                    thesis=((21928, 73.2, 27.1), (35281, 81.4, 76.3), (32223, 83.3, 77.0))),
     "head": World("a head on a turntable", view="003", table="Table 8.2", figures="8.9, 8.11, 8.12",
                   thesis=((127245, 40.2, 29.3), (65890, 63.4, 57.7), (62996, 64.2, 59.9))),
-    "mug": World("a hollow mug on a turntable", view="003", figures="8.16"),
+    "mug": World("a hollow mug on a turntable", view="003", figures="8.16", sections=("section_z", "section_y")),
     "street": World("a street, its light as it is", light=("--illumination", "none", "--matching", "canonical"),
                     table="Table 8.3", figures=STREET_FIGURES,
                     thesis=((223721, 46.1, 25.3), (173755, 42.3, 26.2), (114488, 47.8, 39.5)), **STREET),
@@ -72,10 +74,8 @@ WORLDS = {
     "shared-plane": World("the data set plane", data="plane", shared=True),
     "shared-head": World("the data set head", data="head", shared=True),
 }
-# The default choice once more at the program's own resolution.
-FINE_RESOLUTION = 256
-FINE = ["plane", "head", "mug", "shared-plane", "shared-head"]
-
+# A still life in a room that goes on beyond the box; nothing is masked.
+ROOM, ROOM_RESOLUTION, ROOM_SHARES = "table", 160, (0.5, 1.0)  # ..., voxels, percent of the box's diagonal
 COLUMNS = [("voxels", "voxels"), ("close", "within 4 voxels %"), ("opacity", "weighted mean opacity %"),
            ("covered", "surface covered %"), ("rms", "RMS %"), ("depth_1", "depth within 1 voxel %"),
            ("depth_4", "depth within 4 voxels %"), ("f_score", "F at 1 % of the diagonal")]
@@ -104,7 +104,7 @@ def selected(pattern):
 def reconstruct_options(run, resolution, sky="SKY"):
     name, update, agreement, space = run
     world = WORLDS[name]
-    return ["--update", update, "--agreement", agreement, "--color-space", space,
+    return [*RULES[update], "--agreement", agreement, "--color-space", space,
             *(world.size or ("--resolution", str(resolution))),
             *(str(sky) if option == "SKY" else option for option in world.light)]
 
@@ -116,26 +116,45 @@ def shared_folder(name):
     return folder if folder and folder.is_dir() else None
 
 
-def make(command, folder, done):
-    """Runs a command, unless the file `done` of its folder is there and came from the same command."""
+@functools.cache
+def digest(program):
+    """Of the program's file; empty where it is looked up elsewhere."""
+    path = pathlib.Path(program)
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else ""
+
+
+def make(command, folder, done, prepare=lambda folder: None):
+    """Runs a command, unless the file `done` of its folder is there and came from the same program and command.
+
+    `prepare` is called with the folder, which is not there then, before the command is run.
+    """
     stamp = folder.with_name(folder.name + ".command")
     text = shlex.join(command)
-    if (folder / done).exists() and stamp.exists() and stamp.read_text() == text:
+    made_by = f"{text}\n{digest(command[0])}\n"
+    if (folder / done).exists() and stamp.exists() and stamp.read_text() == made_by:
         return False
     stamp.unlink(missing_ok=True)
     shutil.rmtree(folder, ignore_errors=True)
+    prepare(folder)
     print(text, flush=True)
     begun = time.monotonic()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     print(f"  {time.monotonic() - begun:.0f} s", flush=True)
-    stamp.write_text(text)
+    stamp.write_text(made_by)
     return True
 
 
-def one_percent_of_diagonal(dataset):
+def share_of_diagonal(dataset, percent):
     """World units; of the box that the data set asks for."""
     low, high = json.loads((dataset / "transforms.json").read_text())["scene_bounds"]
-    return 0.01 * math.dist(low, high)
+    return percent / 100 * math.dist(low, high)
+
+
+def make_world(name, options):
+    """The folder of a world that is made, and whether it has been made anew."""
+    data = options.work / name
+    return data, make([str(options.roxel), "synth", name, "-o", str(data), "--seed", str(SEED), "--quiet"], data,
+                      "transforms.json")
 
 
 def data_of(name, options):
@@ -143,15 +162,13 @@ def data_of(name, options):
     world = WORLDS[name]
     if world.shared:
         return shared_folder(world.data), False
-    data = options.work / (world.data or name)
-    return data, make([str(options.roxel), "synth", world.data or name, "-o", str(data), "--seed", str(SEED),
-                       "--quiet"], data, "transforms.json")
+    return make_world(world.data or name, options)
 
 
-def measure(run, options, resolution=None):
+def measure(run, options):
     """The folder with a run's metrics, made where it is not there; None where its data are not."""
-    roxel, resolution = str(options.roxel), resolution or options.resolution
-    work, world = options.work / str(resolution), WORLDS[run[0]]
+    roxel = str(options.roxel)
+    work, world = options.work / str(options.resolution), WORLDS[run[0]]
     work.mkdir(parents=True, exist_ok=True)
     data, anew = data_of(run[0], options)
     if data is None:
@@ -160,12 +177,25 @@ def measure(run, options, resolution=None):
     sky = data.with_name(data.name + "-sky")
     if "SKY" in world.light:
         anew = make([roxel, "sky", str(data), "-o", str(sky), "--no-pictures", "--quiet"], sky, "summary.json") or anew
-    command = [roxel, "reconstruct", str(data), "-o", str(made), *reconstruct_options(run, resolution, sky)]
+    command = [roxel, "reconstruct", str(data), "-o", str(made), *reconstruct_options(run, options.resolution, sky)]
     if make([*command, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet"], made, "summary.json") or anew:
         shutil.rmtree(metrics, ignore_errors=True)
     make([roxel, "eval", str(made), "--truth", str(data), "-o", str(metrics), "--opacity-threshold",
-          str(OPACITY_THRESHOLD), "--distances", f"{one_percent_of_diagonal(data):.6g}",
+          str(OPACITY_THRESHOLD), "--distances", f"{share_of_diagonal(data, 1):.6g}",
           *(["--section=" + world.through] if world.through else []), "--quiet"],
+         metrics, "metrics.json")
+    return metrics
+
+
+def measure_room(options):
+    """The folder with the room's metrics: the whole default run, with depth refined and a surface."""
+    data, anew = make_world(ROOM, options)
+    made, metrics = options.work / f"{ROOM}-{ROOM_RESOLUTION}", options.work / f"{ROOM}-{ROOM_RESOLUTION}-metrics"
+    if make([str(options.roxel), "reconstruct", str(data), "-o", str(made), "--resolution", str(ROOM_RESOLUTION), "--no-report",
+             "--quiet"], made, "summary.json") or anew:
+        shutil.rmtree(metrics, ignore_errors=True)
+    distances = ",".join(f"{share_of_diagonal(data, share):.6g}" for share in ROOM_SHARES)
+    make([str(options.roxel), "eval", str(made), "--truth", str(data), "-o", str(metrics), "--distances", distances, "--quiet"],
          metrics, "metrics.json")
     return metrics
 
@@ -205,7 +235,7 @@ def row(cells):
 
 
 def choice_name(choice):
-    names = {("exponential", "rgb"): "exponential RGB (Roxels)", ("gaussian", "rgb"): "Gaussian RGB",
+    names = {("exponential", "srgb"): "exponential sRGB", ("exponential", "rgb"): "exponential RGB (Roxels)", ("gaussian", "rgb"): "Gaussian RGB",
              ("gaussian", "luv"): "Gaussian Luv", ("exponential", "luv"): "exponential Luv"}
     return names[choice]
 
@@ -229,7 +259,7 @@ def world_table(world, results):
 
 def pictures_of(run):
     """Pairs of a picture's file beside a run's metrics and its file beside the page."""
-    return [(f"{stem}.svg", f"{run_name(run)}-{stem}.svg") for stem in (WORLDS[run[0]].section, HISTOGRAM)]
+    return [(f"{stem}.svg", f"{run_name(run)}-{stem}.svg") for stem in (*WORLDS[run[0]].sections, HISTOGRAM)]
 
 
 SHORTEST = 0.5  # voxels
@@ -275,7 +305,7 @@ def picture_table(world, results):
     choices = THESIS_ORDER[::-1]
     lines = [row(["rule"] + [choice_name(choice) for choice in choices]), row(["---"] * (1 + len(choices)))]
     for update in WORLDS[world].updates:
-        for i in range(2):
+        for i in range(len(WORLDS[world].sections) + 1):
             runs = [(world, update, *choice) for choice in choices]
             shown = [f"![{run_name(run)}]({pictures_of(run)[i][1]})" if run in results else "-" for run in runs]
             if any(run in results for run in runs):
@@ -311,9 +341,19 @@ def ordering_table(results):
     return lines
 
 
-def fine_table(fine):
-    lines = [row(["world"] + [title for _, title in COLUMNS]), row(["---"] + ["---:"] * len(COLUMNS))]
-    return lines + [row([world] + [cell(key, values[key]) for key, _ in COLUMNS]) for world, values in fine.items()]
+def room_part(metrics):
+    """The still life: precision, recall and F-score of its points and surface."""
+    lines = [f"## {ROOM}: a still life in a room, without masks", "",
+             f"`roxel reconstruct {ROOM} --resolution {ROOM_RESOLUTION}`: bounds around the still life alone, all else as it is. Precision / recall / "
+             "**F-score** at shares of the box's diagonal:", "",
+             row(["", *(f"{share:g} %" for share in ROOM_SHARES)]), row(["---"] * (1 + len(ROOM_SHARES)))]
+    for surface in metrics["surfaces"]:
+        if surface["name"] != "voxels":
+            lines.append(row([surface["name"], *(f"{w['precision']:.3f} / {w['recall']:.3f} / **{w['f_score']:.3f}**"
+                                                 for w in surface["within"])]))
+    within = metrics["depth"]["share_within_voxels"]
+    return lines + ["", "Of the pixels of the still life, " + ", ".join(f"{100 * within[v]:.1f} %" for v in ("0.5", "1", "4")) +
+                    " have depth within 0.5, 1 and 4 voxels.", ""]
 
 
 HEAD = """# Tables 8.1 to 8.4 of the thesis, reproduced
@@ -327,7 +367,8 @@ benchmarks/quality/tables.py --resolution {resolution}
 
 Worlds: `roxel synth WORLD --seed {seed}` with its other options at their defaults. Runs: `roxel reconstruct --update RULE --agreement
 AGREEMENT --color-space SPACE --resolution {resolution}` (the street: `--voxel-size 1`, light as its heading says), all else at its
-default, so masks are used and noise and scale are the space's own. `roxels` is the rule that the thesis prints, `posterior` is ours.
+default, so masks are used and noise and scale are the space's own. `posterior` is our rule; `roxels` is the one that the thesis prints, with
+what rays are compared with there ({roxels}).
 Measured by `roxel eval --opacity-threshold {opacity}`: one threshold for all
 ([evaluation.md](../evaluation.md)). *RMS* is over the object; *surface covered* is the share of what two views see that has a counted voxel
 within one voxel; *F* is of the depth points at 1 % of the box's diagonal.
@@ -354,14 +395,13 @@ def world_part(world, results, sheets):
                     *picture_table(world, results), ""]
 
 
-def document(results, resolution, remarks="", fine={}, sheets=()):
-    lines = HEAD.format(resolution=resolution, seed=SEED, opacity=OPACITY_THRESHOLD).splitlines() + [""]
+def document(results, resolution, remarks="", room=None, sheets=()):
+    lines = HEAD.format(resolution=resolution, seed=SEED, opacity=OPACITY_THRESHOLD,
+                        roxels="`" + " ".join(RULES["roxels"]) + "`").splitlines() + [""]
     for world in WORLDS:
         if any(run[0] == world for run in results):
             lines += world_part(world, results, sheets)
-    if fine:
-        lines += [f"## The default choice at the program's own resolution of {FINE_RESOLUTION}", "",
-                  "`posterior`, Gaussian Luv, with all other options as they are; no belief propagation, no refinement.", "", *fine_table(fine), ""]
+    lines += room_part(room) if room else []
     lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results), ""]
     return "\n".join(lines) + (f"\n{remarks.strip()}\n" if remarks.strip() else "")
 
@@ -393,8 +433,8 @@ def add_places(parser):
 def parse(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_places(parser)
-    parser.add_argument("--resolution", type=int, default=96,
-                        help="finest voxels along the longest side; 256 is the program's own [96]")
+    parser.add_argument("--resolution", type=int, default=256,
+                        help="finest voxels along the longest side [256, the program's own]")
     parser.add_argument("--only", default="", help="make the runs whose name WORLD-RULE-AGREEMENT-SPACE "
                         "matches, e.g. 'head-*'; others are in the tables where they were made before")
     parser.add_argument("--write-only", action="store_true", help="make nothing; write tables of what is there")
@@ -404,27 +444,25 @@ def parse(arguments):
 def main(arguments):
     options = parse(arguments)
     wanted = [] if options.write_only else selected(options.only)
-    if not wanted and not options.write_only and not fnmatch.filter([f"fine-{world}" for world in FINE], options.only):
-        sys.exit(f"tables: no run matches --only {options.only}; they are named like {run_name(all_runs()[0])}")
+    with_room = not options.write_only and fnmatch.fnmatch(ROOM, options.only or "*")
+    if not wanted and not with_room and not options.write_only:
+        sys.exit(f"tables: no run matches --only {options.only}; they are named like {run_name(all_runs()[0])}, and {ROOM}")
     for run in wanted:
         if measure(run, options) is None:
             print(f"skipped: {run_name(run)}, as ROXEL_TEST_DATA has no {WORLDS[run[0]].data}", file=sys.stderr)
-    fine_runs = {world: (world, "posterior", "gaussian", "luv") for world in FINE}
-    for world, run in fine_runs.items():
-        if not options.write_only and (not options.only or fnmatch.fnmatch(f"fine-{world}", options.only)):
-            measure(run, options, FINE_RESOLUTION)
-    metrics_of = lambda run, resolution: options.work / str(resolution) / (run_name(run) + "-metrics")
+    if with_room:
+        measure_room(options)
     there = lambda folder: (folder / "metrics.json").exists()
-    folders = {run: metrics_of(run, options.resolution) for run in all_runs()}
+    folders = {run: options.work / str(options.resolution) / (run_name(run) + "-metrics") for run in all_runs()}
     results = {run: read_figures(folder) for run, folder in folders.items() if there(folder)}
-    fine = {world: read_figures(metrics_of(run, FINE_RESOLUTION)) for world, run in fine_runs.items()
-            if there(metrics_of(run, FINE_RESOLUTION))}
+    room = options.work / f"{ROOM}-{ROOM_RESOLUTION}-metrics" / "metrics.json"
     options.docs.mkdir(parents=True, exist_ok=True)
     copy_pictures(results, folders, options.docs)
     sheets = [world for world in WORLDS if render_sheet(world, results, options)]
     remarks = pathlib.Path(__file__).with_name("tables_remarks.md")
     (options.docs / "tables.md").write_text(
-        document(results, options.resolution, remarks.read_text() if remarks.exists() else "", fine, sheets))
+        document(results, options.resolution, remarks.read_text() if remarks.exists() else "",
+                 json.loads(room.read_text()) if room.exists() else None, sheets))
     write_csv(options.docs / "tables.csv", results)
     print(f"{len(results)} of {len(all_runs())} runs -> {options.docs / 'tables.md'}")
 

@@ -52,6 +52,17 @@ class Tables(unittest.TestCase):
         self.assertLess(max(i for i, line in enumerate(lines) if "thesis" in line),
                         min(i for i, line in enumerate(lines) if "ours" in line))
 
+    def test_the_rule_as_printed_is_told_in_full(self):
+        self.assertIn("`--update roxels --no-predictive --outlier 0`", tables.document({}, 77))
+
+    def test_the_rooms_points_and_surface_have_a_row_each(self):
+        surfaces = [{"name": name, "within": [{"distance": d, "precision": 0.5, "recall": 0.25, "f_score": f} for d, f in ((1, 0.333), (2, 0.75))]}
+                    for name in ("voxels", "depth points", "mesh")]
+        lines = tables.room_part({"surfaces": surfaces, "depth": {"share_within_voxels": {"0.5": 0.3, "1": 0.6, "4": 0.9}}})
+        self.assertIn("| mesh | 0.500 / 0.250 / **0.333** | 0.500 / 0.250 / **0.750** |", lines)
+        self.assertFalse(any("voxels |" in line for line in lines))
+        self.assertIn("30.0 %, 60.0 %, 90.0 %", lines[-2])
+
     def test_the_order_is_told_from_the_figures(self):
         said = {(0.9, 0.8, 0.7): "holds", (0.9, 0.9, 0.7): "holds, with a tie",
                 (0.8, 0.9, 0.7): "RGB before Luv, both before exponential",
@@ -108,14 +119,14 @@ class Tables(unittest.TestCase):
 
 class Runs(unittest.TestCase):
     def test_names_select(self):
-        self.assertEqual(len(tables.selected("")), 4 * 8 + 8 + 2 * 6 + 1)
-        self.assertEqual(len(tables.selected("head-roxels-*")), 4)
+        self.assertEqual(len(tables.selected("")), 4 * 10 + 10 + 2 * 6 + 1)
+        self.assertEqual(len(tables.selected("head-roxels-*")), 5)
         self.assertEqual(tables.selected("nothing"), [])
 
     def test_a_streets_light_is_in_its_command(self):
         run = ("street-sky", "roxels", "gaussian", "luv")
         self.assertEqual(tables.reconstruct_options(run, 96, "there"),
-                         ["--update", "roxels", "--agreement", "gaussian", "--color-space", "luv", "--voxel-size", "1",
+                         ["--update", "roxels", "--no-predictive", "--outlier", "0", "--agreement", "gaussian", "--color-space", "luv", "--voxel-size", "1",
                           "--illumination", "sky", "--matching", "canonical", "--sky", "there"])
         self.assertIn("96", tables.reconstruct_options(("plane", "roxels", "gaussian", "luv"), 96))
 
@@ -142,10 +153,28 @@ class Runs(unittest.TestCase):
                 self.assertEqual(tables.make(["sh", "-c", command], folder, "done"), made)
             self.assertEqual(count.read_text(), "x\nx\n")
 
-    def test_one_percent_is_of_the_data_sets_box(self):
+    def test_a_run_is_made_again_by_another_program(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder, program = pathlib.Path(name) / "run", pathlib.Path(name) / "program"
+            for text, made in [("one", True), ("one", False), ("two", True)]:
+                program.write_text(f"#!/bin/sh\nmkdir {folder} && touch {folder}/done && echo {text} > {folder}/by\n")
+                program.chmod(0o755)
+                tables.digest.cache_clear()
+                self.assertEqual(tables.make([str(program)], folder, "done"), made)
+            self.assertEqual((folder / "by").read_text(), "two\n")
+
+    def test_a_prepared_folder_is_there_for_the_command(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name) / "run"
+            command = ["sh", "-c", f"mv {folder}/begun {folder}/done"]
+            prepare = lambda f: (f.mkdir(), (f / "begun").write_text("x"))
+            self.assertEqual([tables.make(command, folder, "done", prepare) for _ in range(2)], [True, False])
+
+    def test_shares_are_of_the_data_sets_diagonal(self):
         with tempfile.TemporaryDirectory() as name:
             (pathlib.Path(name) / "transforms.json").write_text(json.dumps({"scene_bounds": [[0, 0, 0], [2, 3, 6]]}))
-            self.assertAlmostEqual(tables.one_percent_of_diagonal(pathlib.Path(name)), 0.07)
+            self.assertAlmostEqual(tables.share_of_diagonal(pathlib.Path(name), 1), 0.07)
+            self.assertAlmostEqual(tables.share_of_diagonal(pathlib.Path(name), 0.5), 0.035)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #include "roxel/image/outline.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 
@@ -20,17 +21,29 @@ bool beside_object(const Mask& foreground, int x, int y) {
   return false;
 }
 
+/// Of pixels by their value in the mask: `least` where an outline halves the pixel, towards 1 where it hardly
+/// touches it.
+std::array<double, 256> weights(double least) {
+  std::array<double, 256> result;
+  for (int share = 0; share < 256; ++share) {
+    const double lopsided = 2 * share / 255.0 - 1;
+    result[share] = least + (1 - least) * lopsided * lopsided;
+  }
+  return result;
+}
+
 }  // namespace
 
-Mask lighter_on_outline(const Mask& valid, const Mask& foreground, double weight) {
-  if (foreground.empty() || weight == 1) return valid;
+Mask lighter_on_outline(const Mask& valid, const Mask& foreground, double least) {
+  if (foreground.empty() || least == 1) return valid;
+  const std::array<double, 256> weight = weights(least);
   Mask result = valid.empty() ? Mask(foreground.width(), foreground.height(), 255) : valid;
   ROXEL_CHECK(result.width() == foreground.width() && result.height() == foreground.height());
   for (int y = 0; y < foreground.height(); ++y)
     for (int x = 0; x < foreground.width(); ++x) {
       const std::uint8_t share = foreground.at(x, y);
       if (share > kBackground && share < kObject && beside_object(foreground, x, y))
-        result.at(x, y) = static_cast<std::uint8_t>(std::lround(weight * result.at(x, y)));
+        result.at(x, y) = static_cast<std::uint8_t>(std::lround(weight[share] * result.at(x, y)));
     }
   return result;
 }

@@ -44,10 +44,19 @@ TEST(LighterOnOutline, ThePixelsThatTheOutlineCutsAndNoOther) {
         continue;
       }
       const bool hardly = object.at(x, y) <= 5 || object.at(x, y) >= 250;
-      EXPECT_EQ(made.at(x, y), hardly ? 255 : 64);
+      const double share = object.at(x, y) / 255.0;
+      const double expected = 255 * (1 - 0.75 * 4 * share * (1 - share));
+      EXPECT_NEAR(made.at(x, y), hardly ? 255 : expected, 0.5);
       cut += !hardly;
     }
   EXPECT_GT(cut, 30);
+}
+
+TEST(LighterOnOutline, ThePixelThatIsHalfObjectHasTheLeastWeight) {
+  Mask object(5, 1, 255);
+  object.at(0, 0) = 64, object.at(2, 0) = 128, object.at(4, 0) = 191;
+  const Mask made = lighter_on_outline({}, object, 0);
+  EXPECT_EQ(made.data(), (std::vector<std::uint8_t>{63, 255, 0, 255, 63}));  // a quarter of the weight, none
 }
 
 TEST(LighterOnOutline, NoiseOfAFileIsNoOutline) {

@@ -39,7 +39,7 @@ struct ReconstructOptions {
   double samples_per_voxel = 1;
   bool interpolate = false;
   double observation_weight = 1;
-  double outline_weight = 0;  ///< of pixels that an object's outline passes through, 0 to 1
+  double outline_weight = 0;  ///< of pixels that an object's outline halves, 0 to 1
 
   // Colour and its agreement
   ColorSpace color_space = ColorSpace::kLuv;
