@@ -33,6 +33,7 @@ struct MeasureSwitches {
   double opacity_threshold = 0.04;
   double confidence_threshold = 0.001;
   int views_agree = 2;
+  double sure_within = 4;
   int samples = 200000;
   std::int64_t seed = 1;
   std::optional<std::array<double, 3>> section;
@@ -89,6 +90,11 @@ OptionTable<MeasureSwitches> measure_table() {
   table.add("views-agree", &MeasureSwitches::views_agree)
       .help("Depth maps that must agree on a point of the stricter set of depth points")
       .range(2, 1000);
+  table.add("sure-within", &MeasureSwitches::sure_within)
+      .help("Most deviation of depth of a set of depth points that the run is sure of")
+      .unit("voxels")
+      .above(0)
+      .source("docs/evaluation.md, Surfaces");
   table.add("samples", &MeasureSwitches::samples)
       .help("Points drawn on the true surface, and on a mesh to measure")
       .range(1000, 100000000)
@@ -133,6 +139,7 @@ MeasureOptions measure_options(const MeasureSwitches& switches) {
   options.opacity_threshold = switches.opacity_threshold;
   options.confidence_threshold = switches.confidence_threshold;
   options.views_agree = switches.views_agree;
+  options.sure_within = switches.sure_within;
   options.samples = switches.samples;
   options.seed = static_cast<std::uint64_t>(switches.seed);
   options.section = switches.section;

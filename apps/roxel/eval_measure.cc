@@ -13,6 +13,7 @@
 #include "roxel/io/image_file.h"
 #include "roxel/io/ply_file.h"
 #include "roxel/io/sky_truth.h"
+#include "roxel/report/markup.h"
 #include "roxel/report/pictures.h"
 #include "roxel/solve/gains.h"
 #include "run_renderer.h"
@@ -32,7 +33,8 @@ struct MeasuredView {
   std::optional<Reliability> reliability;
   std::optional<NamedImageQuality> quality;
   std::optional<ViewDepth> estimate;  ///< pixels that count alone
-  std::optional<ViewDepth> refined;   ///< the same of the refined depth
+  std::optional<ViewDepth> sure;      ///< of these, those of small enough deviation
+  std::optional<ViewDepth> refined;   ///< pixels that count of the refined depth
 };
 
 std::string size_text(const Image& image) {
@@ -128,6 +130,7 @@ class Measurement {
       if (view.depth) out_.depth.push_back(std::move(*view.depth));
       if (view.quality) out_.images.push_back(std::move(*view.quality));
       if (view.estimate) estimates_.push_back(std::move(*view.estimate));
+      if (view.sure) sure_.push_back(std::move(*view.sure));
       if (view.refined) refined_.push_back(std::move(*view.refined));
       if (!view.reliability) continue;
       if (!out_.opacity_reliability) out_.opacity_reliability.emplace();
@@ -167,7 +170,12 @@ class Measurement {
       }
     }
     if (estimate && !truth.empty()) measure_depth(name, *estimate, truth, out);
-    if (estimate && view) out.estimate = countable(*estimate, estimate->depth, view->camera);
+    if (estimate && view) {
+      out.estimate = countable(*estimate, estimate->depth, view->camera);
+      const double most_sigma = options_.sure_within * source_.voxel_size();
+      out.sure =
+          countable(*estimate, sure_depth({estimate->depth, estimate->variance}, most_sigma), view->camera);
+    }
     if (estimate && view && !estimate->depth_refined.empty())
       out.refined = countable(*estimate, estimate->depth_refined, view->camera);
     if (view) out.quality = measure_render(*view, estimate ? &*estimate : nullptr, truth);
@@ -270,6 +278,8 @@ class Measurement {
       const DepthPointOptions agreeing{options_.views_agree, out_.voxel_size};
       add_points("depth points that " + std::to_string(options_.views_agree) + " views agree on",
                  one_point_a_cell(depth_points(estimates_, agreeing, threads_), cell));
+      add_points("depth points of sigma within " + short_number(options_.sure_within) + " voxels",
+                 one_point_a_cell(depth_points(sure_, {}, threads_), cell));
     }
     if (!refined_.empty())
       add_points("refined depth points", one_point_a_cell(depth_points(refined_, {}, threads_), cell));
@@ -414,7 +424,7 @@ class Measurement {
   int threads_;
   RunMeasures out_;
   std::vector<Eigen::Vector3d> samples_, seen_;  ///< of the true surface; those that two views see
-  std::vector<ViewDepth> estimates_, refined_;
+  std::vector<ViewDepth> estimates_, sure_, refined_;
   SavedVoxels saved_;
   std::optional<SurfaceDistance> truth_distance_;
   std::optional<RunRenderer> renderer_;

@@ -12,6 +12,7 @@ struct MeasureOptions {
   double opacity_threshold = 0.04;   ///< of voxels that count as saved
   double confidence_threshold = 0.001;  ///< of these, too
   int views_agree = 2;                  ///< for the second set of depth points
+  double sure_within = 4;               ///< voxels: most deviation of depth of the third set
   int samples = 200000;                 ///< of the true surface
   std::uint64_t seed = 1;
   std::optional<std::array<double, 3>> section;  ///< point that the sections go through

@@ -27,11 +27,23 @@ import sys
 import time
 
 CHOICES = [("exponential", "srgb"), ("exponential", "rgb"), ("gaussian", "rgb"), ("gaussian", "luv"), ("exponential", "luv")]
-RULES = {"posterior": ("--update", "posterior"), "roxels": ("--update", "roxels", "--no-predictive", "--outlier", "0")}
+COARSE = 96  # voxels along the longest side at which rules are compared: the thesis's keeps most of the box to the end
 # The order that the thesis finds, best first.
 THESIS_ORDER = [("gaussian", "luv"), ("gaussian", "rgb"), ("exponential", "rgb")]
 SEED = 1
 OPACITY_THRESHOLD = 0.3
+
+
+@dataclasses.dataclass(frozen=True)
+class Rule:
+    update: tuple                  # options of reconstruct
+    resolution: int = 0            # voxels along the longest side; 0: --resolution
+    pictures: bool = True
+
+
+RULES = {"posterior": Rule(("--update", "posterior")),
+         "posterior-coarse": Rule(("--update", "posterior"), COARSE, pictures=False),
+         "roxels": Rule(("--update", "roxels", "--no-predictive", "--outlier", "0"), COARSE)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +56,7 @@ class World:
     sections: tuple = ("section_x",)
     through: str = ""              # point of the sections; empty: the middle of the box
     view: str = ""                 # image whose renders are shown; empty: none
-    updates: tuple = ("posterior", "roxels")
+    updates: tuple = ("posterior", "posterior-coarse", "roxels")
     choices: tuple = tuple(CHOICES)
     table: str = ""                # the thesis's
     figures: str = ""              # of the thesis, which the pictures are like
@@ -53,7 +65,7 @@ class World:
 
 
 STREET = {"data": "street", "size": ("--voxel-size", "1"), "sections": ("section_z",), "through": "-1,0,5",
-          "view": "n03_04", "choices": tuple(THESIS_ORDER[::-1])}
+          "view": "n03_04", "updates": ("posterior", "roxels"), "choices": tuple(THESIS_ORDER[::-1])}
 STREET_FIGURES = "8.20, 8.22, 8.27, 8.30 to 8.32"
 WORLDS = {
     "plane": World("a printed board", view="007", table="Table 8.1", figures="8.3, 8.5, 8.6",
@@ -70,7 +82,7 @@ WORLDS = {
                         thesis=((212537, 45.2, 27.2), (118236, 40.6, 27.4), (116920, 47.3, 43.9)), **STREET),
     "street-local": World("the street, adjusted, and compared without local light",
                           light=("--illumination", "sky", "--matching", "local", "--sky", "SKY"),
-                          updates=("posterior",), **{**STREET, "choices": (("gaussian", "luv"),)}),
+                          **{**STREET, "updates": ("posterior",), "choices": (("gaussian", "luv"),)}),
     "shared-plane": World("the data set plane", data="plane", shared=True),
     "shared-head": World("the data set head", data="head", shared=True),
 }
@@ -101,11 +113,20 @@ def selected(pattern):
     return [run for run in all_runs() if not pattern or fnmatch.fnmatch(run_name(run), pattern)]
 
 
+def resolution_of(run, resolution):
+    """Voxels along the longest side, where the finest are asked to be `resolution`."""
+    return RULES[run[1]].resolution or resolution
+
+
+def metrics_folder(run, options):
+    return options.work / str(resolution_of(run, options.resolution)) / (run_name(run) + "-metrics")
+
+
 def reconstruct_options(run, resolution, sky="SKY"):
     name, update, agreement, space = run
     world = WORLDS[name]
-    return [*RULES[update], "--agreement", agreement, "--color-space", space,
-            *(world.size or ("--resolution", str(resolution))),
+    return [*RULES[update].update, "--agreement", agreement, "--color-space", space,
+            *(world.size or ("--resolution", str(resolution_of(run, resolution)))),
             *(str(sky) if option == "SKY" else option for option in world.light)]
 
 
@@ -168,12 +189,12 @@ def data_of(name, options):
 def measure(run, options):
     """The folder with a run's metrics, made where it is not there; None where its data are not."""
     roxel = str(options.roxel)
-    work, world = options.work / str(options.resolution), WORLDS[run[0]]
-    work.mkdir(parents=True, exist_ok=True)
+    metrics, world = metrics_folder(run, options), WORLDS[run[0]]
     data, anew = data_of(run[0], options)
     if data is None:
         return None
-    made, metrics = work / run_name(run), work / (run_name(run) + "-metrics")
+    metrics.parent.mkdir(parents=True, exist_ok=True)
+    made = metrics.with_name(run_name(run))
     sky = data.with_name(data.name + "-sky")
     if "SKY" in world.light:
         anew = make([roxel, "sky", str(data), "-o", str(sky), "--no-pictures", "--quiet"], sky, "summary.json") or anew
@@ -240,19 +261,24 @@ def choice_name(choice):
     return names[choice]
 
 
-def world_table(world, results):
+def world_table(world, results, resolution):
     """One world's table: the thesis's rows first, then ours for each update rule."""
-    lines = [row(["rule", "agreement"] + [title for _, title in COLUMNS]),
-             row(["---", "---"] + ["---:"] * len(COLUMNS))]
+    def along(run):
+        return str(resolution_of(run, resolution)) if not WORLDS[world].size else "-"
+
+    lines = [row(["rule", "along the box", "agreement"] + [title for _, title in COLUMNS]),
+             row(["---", "---:", "---"] + ["---:"] * len(COLUMNS))]
     for choice, known in thesis_rows(world).items():
         values = dict(zip(["voxels", "close", "opacity"], known))
-        lines.append(row([f"thesis, {WORLDS[world].table}", choice_name(choice)] +
+        lines.append(row([f"thesis, {WORLDS[world].table}", "-", choice_name(choice)] +
                          [cell(key, values.get(key)) for key, _ in COLUMNS]))
     for update in WORLDS[world].updates:
         for choice in WORLDS[world].choices:
-            values = results.get((world, update, *choice))
+            run = (world, update, *choice)
+            values = results.get(run)
             if values:
-                lines.append(row([f"ours, `{update}`", choice_name(choice)] +
+                rule = RULES[update].update[1]
+                lines.append(row([f"ours, `{rule}`" if rule == "posterior" else f"the thesis's, `{rule}`", along(run), choice_name(choice)] +
                                  [cell(key, values[key]) for key, _ in COLUMNS]))
     return lines
 
@@ -275,10 +301,14 @@ def without_specks(svg):
 
 def copy_pictures(results, folders, docs):
     for run in results:
-        if run[2:] in THESIS_ORDER and not WORLDS[run[0]].shared:
+        if run[2:] in THESIS_ORDER and RULES[run[1]].pictures and not WORLDS[run[0]].shared:
             for source, target in pictures_of(run):
                 text = (folders[run] / source).read_text()
                 (docs / target).write_text(without_specks(text) if WORLDS[run[0]].data == "street" else text)
+
+
+def with_pictures(world):
+    return [update for update in WORLDS[world].updates if RULES[update].pictures]
 
 
 def render_sheet(world, results, options):
@@ -289,9 +319,9 @@ def render_sheet(world, results, options):
     photo = next((str(p) for p in [(options.work / (WORLDS[world].data or world) / "images" / (view + suffix))
                                    for suffix in (".png", ".exr")] if p.exists()), "-")
     choices, files = THESIS_ORDER[::-1], []
-    for update in WORLDS[world].updates:
-        renders = [options.work / str(options.resolution) / run_name((world, update, *choice)) / "render" / (view + ".png")
-                   for choice in choices]
+    for update in with_pictures(world):
+        runs = [(world, update, *choice) for choice in choices]
+        renders = [metrics_folder(run, options).with_name(run_name(run)) / "render" / (view + ".png") for run in runs]
         if any(path.exists() for path in renders):
             files += [photo, *(str(path) if path.exists() else "-" for path in renders)]
     if not files:
@@ -304,7 +334,7 @@ def picture_table(world, results):
     """Sections and histograms, a column for each of the thesis's choices, worst first as there."""
     choices = THESIS_ORDER[::-1]
     lines = [row(["rule"] + [choice_name(choice) for choice in choices]), row(["---"] * (1 + len(choices)))]
-    for update in WORLDS[world].updates:
+    for update in with_pictures(world):
         for i in range(len(WORLDS[world].sections) + 1):
             runs = [(world, update, *choice) for choice in choices]
             shown = [f"![{run_name(run)}]({pictures_of(run)[i][1]})" if run in results else "-" for run in runs]
@@ -329,15 +359,16 @@ def ordering(world, update, key, results, less_is_better=False):
     return "RGB before Luv, exponential " + ("between" if rgb >= exponential else "first")
 
 
-def ordering_table(results):
+def ordering_table(results, resolution):
     keys = [("close", "within 4 voxels"), ("opacity", "weighted mean opacity"), ("covered", "surface covered"),
             ("depth_1", "depth within 1 voxel"), ("f_score", "F at 1 %"), ("rms", "RMS (less is better)")]
-    lines = [row(["world", "rule"] + [title for _, title in keys]), row(["---"] * (2 + len(keys)))]
+    lines = [row(["world", "rule", "along the box"] + [title for _, title in keys]), row(["---"] * (3 + len(keys)))]
     for world in WORLDS:
         for update in WORLDS[world].updates:
             found = [ordering(world, update, key, results, key == "rms") for key, _ in keys]
+            along = "-" if WORLDS[world].size else str(resolution_of((world, update), resolution))
             if None not in found:
-                lines.append(row([world, f"`{update}`", *found]))
+                lines.append(row([world, f"`{RULES[update].update[1]}`", along, *found]))
     return lines
 
 
@@ -366,9 +397,10 @@ benchmarks/quality/tables.py --resolution {resolution}
 ```
 
 Worlds: `roxel synth WORLD --seed {seed}` with its other options at their defaults. Runs: `roxel reconstruct --update RULE --agreement
-AGREEMENT --color-space SPACE --resolution {resolution}` (the street: `--voxel-size 1`, light as its heading says), all else at its
-default, so masks are used and noise and scale are the space's own. `posterior` is our rule; `roxels` is the one that the thesis prints, with
-what rays are compared with there ({roxels}).
+AGREEMENT --color-space SPACE --resolution N`, where N is in the column *along the box* (the street: `--voxel-size 1`, light as its heading
+says), all else at its default, so masks are used and noise and scale are the space's own. `posterior` is our rule; `roxels` is the one that
+the thesis prints, with what rays are compared with there ({roxels}). It keeps most of the box to the end, and is compared with ours at {coarse}
+voxels; ours is also shown at the program's own resolution. **Gaussian Luv with `posterior` is the default.**
 Measured by `roxel eval --opacity-threshold {opacity}`: one threshold for all
 ([evaluation.md](../evaluation.md)). *RMS* is over the object; *surface covered* is the share of what two views see that has a counted voxel
 within one voxel; *F* is of the depth points at 1 % of the box's diagonal.
@@ -379,15 +411,15 @@ from the surface.
 """
 
 
-def world_part(world, results, sheets):
+def world_part(world, results, sheets, resolution):
     lines = [f"## {world}: {WORLDS[world].what}", ""]
     if WORLDS[world].light:
         lines += ["`" + " ".join("SKIES" if o == "SKY" else o for o in WORLDS[world].light) + "`", ""]
-    lines += [*world_table(world, results), ""]
+    lines += [*world_table(world, results, resolution), ""]
     if WORLDS[world].shared:
         return lines
     if world in sheets:
-        rules = ", then ".join(f"`{update}`" for update in WORLDS[world].updates)
+        rules = ", then ".join(f"`{update}`" for update in with_pictures(world))
         lines += [f"Photograph {WORLDS[world].view} and its renders with exponential RGB, Gaussian RGB, Gaussian Luv; {rules}:", "",
                   f"![renders of {world}]({world}-renders.jpg)", ""]
     thesis = f", as figures {WORLDS[world].figures} of the thesis" if WORLDS[world].figures else ""
@@ -396,13 +428,13 @@ def world_part(world, results, sheets):
 
 
 def document(results, resolution, remarks="", room=None, sheets=()):
-    lines = HEAD.format(resolution=resolution, seed=SEED, opacity=OPACITY_THRESHOLD,
-                        roxels="`" + " ".join(RULES["roxels"]) + "`").splitlines() + [""]
+    lines = HEAD.format(resolution=resolution, coarse=COARSE, seed=SEED, opacity=OPACITY_THRESHOLD,
+                        roxels="`" + " ".join(RULES["roxels"].update) + "`").splitlines() + [""]
     for world in WORLDS:
         if any(run[0] == world for run in results):
-            lines += world_part(world, results, sheets)
+            lines += world_part(world, results, sheets, resolution)
     lines += room_part(room) if room else []
-    lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results), ""]
+    lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results, resolution), ""]
     return "\n".join(lines) + (f"\n{remarks.strip()}\n" if remarks.strip() else "")
 
 
@@ -434,7 +466,7 @@ def parse(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_places(parser)
     parser.add_argument("--resolution", type=int, default=256,
-                        help="finest voxels along the longest side [256, the program's own]")
+                        help="finest voxels along the longest side; rules are compared at %d [256, the program's own]" % COARSE)
     parser.add_argument("--only", default="", help="make the runs whose name WORLD-RULE-AGREEMENT-SPACE "
                         "matches, e.g. 'head-*'; others are in the tables where they were made before")
     parser.add_argument("--write-only", action="store_true", help="make nothing; write tables of what is there")
@@ -453,7 +485,7 @@ def main(arguments):
     if with_room:
         measure_room(options)
     there = lambda folder: (folder / "metrics.json").exists()
-    folders = {run: options.work / str(options.resolution) / (run_name(run) + "-metrics") for run in all_runs()}
+    folders = {run: metrics_folder(run, options) for run in all_runs()}
     results = {run: read_figures(folder) for run, folder in folders.items() if there(folder)}
     room = options.work / f"{ROOM}-{ROOM_RESOLUTION}-metrics" / "metrics.json"
     options.docs.mkdir(parents=True, exist_ok=True)

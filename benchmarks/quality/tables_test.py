@@ -45,12 +45,13 @@ class Figures(unittest.TestCase):
 
 class Tables(unittest.TestCase):
     def test_the_thesis_stands_above_ours(self):
-        lines = tables.world_table("plane", results_of("roxels", 0.912, 0.8, 0.7))
-        self.assertIn("| thesis, Table 8.1 | Gaussian Luv | 32223 | 83.3 | 77.0 | - | - | - | - | - |", lines)
-        self.assertEqual(lines[-1], "| ours, `roxels` | Gaussian Luv | 1000 | 91.2 | 80.0 | 95.5 | 5.0 | 61.0 | 84.0 | 0.988 |")
+        lines = tables.world_table("plane", {**results_of("roxels", 0.912, 0.8, 0.7), **results_of("posterior", 0.9, 0.8, 0.7)}, 256)
+        self.assertIn("| thesis, Table 8.1 | - | Gaussian Luv | 32223 | 83.3 | 77.0 | - | - | - | - | - |", lines)
+        self.assertEqual(lines[-1], "| the thesis's, `roxels` | 96 | Gaussian Luv | 1000 | 91.2 | 80.0 | 95.5 | 5.0 | 61.0 | 84.0 | 0.988 |")
+        self.assertIn("| ours, `posterior` | 256 | Gaussian Luv |", "\n".join(lines))
         self.assertEqual(len({line.count("|") for line in lines}), 1)
-        self.assertLess(max(i for i, line in enumerate(lines) if "thesis" in line),
-                        min(i for i, line in enumerate(lines) if "ours" in line))
+        self.assertLess(max(i for i, line in enumerate(lines) if "thesis, Table" in line),
+                        min(i for i, line in enumerate(lines) if "`posterior`" in line))
 
     def test_the_rule_as_printed_is_told_in_full(self):
         self.assertIn("`--update roxels --no-predictive --outlier 0`", tables.document({}, 77))
@@ -81,7 +82,7 @@ class Tables(unittest.TestCase):
         results = results_of("posterior", 0.9, 0.8, 0.7)
         page = tables.document(results, 77, "## By hand\n\nWhy.")
         self.assertIn("tables.py --resolution 77", page)
-        self.assertIn("| plane | `posterior` | holds |", page)
+        self.assertIn("| plane | `posterior` | 77 | holds |", page)
         self.assertIn("(plane-posterior-gaussian-luv-section_x.svg)", page)
         self.assertNotIn("(plane-roxels", page)
         self.assertTrue(page.endswith("## By hand\n\nWhy.\n"))
@@ -119,7 +120,7 @@ class Tables(unittest.TestCase):
 
 class Runs(unittest.TestCase):
     def test_names_select(self):
-        self.assertEqual(len(tables.selected("")), 4 * 10 + 10 + 2 * 6 + 1)
+        self.assertEqual(len(tables.selected("")), 5 * 15 + 2 * 6 + 1)
         self.assertEqual(len(tables.selected("head-roxels-*")), 5)
         self.assertEqual(tables.selected("nothing"), [])
 
@@ -128,7 +129,8 @@ class Runs(unittest.TestCase):
         self.assertEqual(tables.reconstruct_options(run, 96, "there"),
                          ["--update", "roxels", "--no-predictive", "--outlier", "0", "--agreement", "gaussian", "--color-space", "luv", "--voxel-size", "1",
                           "--illumination", "sky", "--matching", "canonical", "--sky", "there"])
-        self.assertIn("96", tables.reconstruct_options(("plane", "roxels", "gaussian", "luv"), 96))
+        for rule, along in [("posterior", "300"), ("posterior-coarse", "96"), ("roxels", "96")]:
+            self.assertIn(along, tables.reconstruct_options(("plane", rule, "gaussian", "luv"), 300))
 
     def test_the_thesis_has_its_four_tables(self):
         self.assertEqual([tables.WORLDS[w].table for w in tables.WORLDS if tables.WORLDS[w].table],
@@ -142,7 +144,7 @@ class Runs(unittest.TestCase):
         with tempfile.TemporaryDirectory() as name, unittest.mock.patch.dict(tables.os.environ, ROXEL_TEST_DATA=name):
             options.work = pathlib.Path(name) / "work"
             self.assertIsNone(tables.measure(run, options))
-        self.assertNotIn("section", "".join(tables.world_part("shared-plane", {run: tables.figures(metrics())}, [])))
+        self.assertNotIn("section", "".join(tables.world_part("shared-plane", {run: tables.figures(metrics())}, [], 96)))
 
     def test_a_run_is_made_once_and_again_when_its_command_changes(self):
         with tempfile.TemporaryDirectory() as name:

@@ -36,7 +36,7 @@ class AccuracyCase(program.Case):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-accuracy-"))
         out = cls.folder / "run"
         for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", *cls.options, "--no-report", "--quiet"],
-                        ["eval", out, "--truth", data, "-o", cls.folder / "metrics", "--quiet"]):
+                        ["eval", out, "--truth", data, "-o", cls.folder / "metrics", "--opacity-threshold", "0.3", "--quiet"]):
             done = program.run(*command, timeout=1000)
             assert done.returncode == 0, done.stderr
         cls.metrics = json.loads((cls.folder / "metrics/metrics.json").read_text())
@@ -52,6 +52,13 @@ class AccuracyCase(program.Case):
         self.assertGreaterEqual(100 * shares["4"], within_4)
         self.assertLess(100 * self.metrics["depth"]["share_of_empty_given_depth"], empty_given_depth)
         self.assertLessEqual(self.metrics["reprojection_rms_percent"], rms_percent)
+
+    def check_voxels(self, opacity, within_4, covered):
+        """Least distance-weighted mean opacity, shares of voxels near the surface and of the surface near one, in percent."""
+        volume = self.metrics["volume"]
+        self.assertGreaterEqual(100 * volume["weighted_mean_opacity"], opacity)
+        self.assertGreaterEqual(100 * volume["share_within_4_voxels"], within_4)
+        self.assertGreaterEqual(100 * volume["share_of_surface_covered"], covered)
 
     def f_score(self, share_of_diagonal):
         within = self.metrics["surfaces"][-1]["within"]
@@ -79,7 +86,8 @@ class Plane(AccuracyCase):
         self.check([99, 99.5, 99.8], [0.96, 0.995], -1.1)
 
     def test_the_volume_and_its_renders(self):
-        self.check_volume(95, 99.5, 3, 2.5)
+        self.check_volume(97.5, 99.8, 3, 2.3)
+        self.check_voxels(90, 99.9, 95)
 
     def test_the_median_of_the_surface_is_near_a_hundredth_of_a_percent_of_the_diagonal(self):
         self.assertLess(self.metrics["surfaces"][-1]["median_to_truth"], 1e-4 * self.diagonal)
@@ -92,7 +100,8 @@ class Head(AccuracyCase):
         self.check([73, 87.5, 94], [0.93, 0.98], 1.15)
 
     def test_the_volume_and_its_renders(self):
-        self.check_volume(66, 97, 2, 3)
+        self.check_volume(84, 97.2, 2, 2.95)
+        self.check_voxels(86.5, 98, 95.5)
 
 
 class Courtyard(AccuracyCase):

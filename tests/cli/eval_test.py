@@ -279,6 +279,7 @@ class Options(EvalCase):
         "opacity-threshold": (["--truth", "MESH"], ["--opacity-threshold", "0.5"]),
         "confidence-threshold": (["--truth", "MESH"], ["--confidence-threshold", "0.5"]),
         "views-agree": (["--truth", "MESH"], ["--views-agree", "3"]),
+        "sure-within": (["--truth", "MESH"], ["--sure-within", "0.5"]),
         "samples": (["--truth", "MESH"], ["--samples", "1000"]),
         "seed": (["--truth", "MESH"], ["--seed", "2"]),
     }
@@ -292,6 +293,16 @@ class Options(EvalCase):
                   for more in ([], ["--opacity-threshold", "0.5"], ["--confidence-threshold", "0.5"])]
         self.assertLess(voxels[1], voxels[0])
         self.assertLess(voxels[2], voxels[0])
+
+    def test_what_the_run_is_not_sure_of_is_left_out_of_the_sure_points(self):
+        points = []
+        for voxels in (0.2, 1, 1000):
+            surfaces = self.measures("--truth", self.mesh, "--sure-within", voxels)["surfaces"]
+            counts = {surface["name"]: surface["points"] for surface in surfaces}
+            points.append(counts[f"depth points of sigma within {voxels} voxels"])
+        self.assertLess(points[0], points[1])
+        self.assertLess(points[1], points[2])
+        self.assertEqual(points[2], counts["depth points"])
 
     def test_every_option_changes_something(self):
         other = self.folder / "other"

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "roxel/base/error.h"
+
 namespace roxel {
 
 Image believed_depth(const DepthLayers& layers) {
@@ -10,6 +12,14 @@ Image believed_depth(const DepthLayers& layers) {
     float& z = depth.data()[i];
     if (!(layers.opacity.data()[i] > 0.5f) || !(z > 0) || !std::isfinite(z)) z = 0;
   }
+  return depth;
+}
+
+Image sure_depth(const DepthEstimates& estimates, double most_sigma) {
+  ROXEL_CHECK(estimates.depth.data().size() == estimates.variance.data().size());
+  Image depth = estimates.depth;
+  for (std::size_t i = 0; i < depth.data().size(); ++i)
+    if (!(estimates.variance.data()[i] <= most_sigma * most_sigma)) depth.data()[i] = 0;
   return depth;
 }
 

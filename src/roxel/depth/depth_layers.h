@@ -25,6 +25,9 @@ struct DepthEstimates {
 /// The volume's, where its rays are more opaque than one half; 0 elsewhere.
 Image believed_depth(const DepthLayers& layers);
 
+/// Depth whose deviation is at most `most_sigma`, world units; 0 elsewhere.
+Image sure_depth(const DepthEstimates& estimates, double most_sigma);
+
 /// The best that the layers hold: refined, else after belief propagation, else what is believed of Z.
 DepthEstimates best_estimates(const DepthLayers& layers);
 
