@@ -4,7 +4,7 @@
 #   make demo     build, reconstruct a small synthetic world, say where the pictures are
 #   make build    build everything
 #   make bench    build and run the benchmarks
-#   make results  make the thesis's tables and figures anew in docs/results; some forty minutes
+#   make results  make the thesis's tables and figures anew in docs/results; more than an hour
 #   make format   format the sources
 #   make docs     write docs/options.md anew from the options table
 #

@@ -20,7 +20,6 @@ LEVELS = [1, 2, 3]                # figure 5.6: the head after each level, the l
 FINEST = 256
 STREET_VOXELS_M = [4, 2, 1]       # figure 8.25
 STREET_PASSES = [1, 3, 8]
-BEST = ("posterior", "gaussian", "luv")
 # Depth: part of tables.py, image that is shown, options of `roxel depth`, what the thesis calls it.
 DEPTHS = {"mug": ("003", [], "8.33"), "street-sky": ("n03_04", ["--no-refine"], "8.35")}
 HEAD = """# Figures 5.6, 8.25 and 8.33 to 8.35 of the thesis, reproduced
@@ -43,12 +42,10 @@ def quiet(options, *command):
     return [str(options.roxel), *map(str, command), "--quiet"]
 
 
-def run_again(options, folder, done, command, anew=False):
-    """Makes `folder` by the command unless it is there; returns whether it was made."""
+def run_again(options, folder, done, command, sources):
+    """Makes `folder` by the command, which reads `sources`, unless it is there."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    if anew:
-        shutil.rmtree(folder, ignore_errors=True)
-    return tables.make(quiet(options, *command), folder, done)
+    tables.make(quiet(options, *command), folder, done, sources)
 
 
 def sheet(options, name, columns, width, files):
@@ -58,25 +55,24 @@ def sheet(options, name, columns, width, files):
 
 def levels_of_head(options):
     """Figure 5.6: folders of metrics, one a level."""
-    data, anew = tables.data_of("head", options)
+    data = tables.data_of("head", options)
     folders = []
     for level in LEVELS:
         voxels = voxels_of(level)
         run = options.work / "figures" / f"head-{voxels}"
-        made = run_again(options, run, "summary.json",
-                         ["reconstruct", data, "-o", run, "--resolution", voxels, "--levels", level, "--no-bp", "--no-refine",
-                          "--no-mesh", "--no-report"], anew)
+        run_again(options, run, "summary.json",
+                  ["reconstruct", data, "-o", run, "--resolution", voxels, "--levels", level, "--no-bp", "--no-refine",
+                   "--no-mesh", "--no-report"], [data])
         metrics = run.with_name(run.name + "-metrics")
-        run_again(options, metrics, "metrics.json", ["eval", run, "--truth", data, "-o", metrics], made)
+        run_again(options, metrics, "metrics.json", ["eval", run, "--truth", data, "-o", metrics], [run])
         folders.append(metrics)
     return folders
 
 
 def growing_street(options):
     """Figure 8.25: renders, a row a voxel size, a column a number of passes. Each size starts from the one before."""
-    data, anew = tables.data_of("street-sky", options)
-    sky = data.with_name(data.name + "-sky")
-    anew = run_again(options, sky, "summary.json", ["sky", data, "-o", sky, "--no-pictures"]) or anew
+    data = tables.data_of("street-sky", options)
+    sky = tables.sky_of(data, options)
     renders, before = [], None
     for voxel in STREET_VOXELS_M:
         for passes in STREET_PASSES:
@@ -84,7 +80,8 @@ def growing_street(options):
             start = ["--init", before] if before else []
             run_again(options, run, "summary.json",
                       ["reconstruct", data, "-o", run, "--voxel-size", voxel, "--levels", 1, "--passes", passes, "--illumination", "sky",
-                       "--sky", sky, "--matching", "canonical", *start, "--no-depth", "--no-mesh", "--no-report"], anew)
+                       "--sky", sky, "--matching", "canonical", *start, "--no-depth", "--no-mesh", "--no-report"],
+                      [data, sky, *([before] if before else [])])
             renders.append(run / "render" / (DEPTHS["street-sky"][0] + ".png"))
         before = options.work / "figures" / f"street-{voxel}m-{STREET_PASSES[-1]}"
     return renders
@@ -92,17 +89,17 @@ def growing_street(options):
 
 def depth_of(part, options):
     """A copy of a run of tables.py with depth after belief propagation: the run it was made from, it, and its metrics."""
-    run = (part, *BEST)
+    run = (part, *tables.BEST)
     metrics_before = tables.measure(run, options)
     before = metrics_before.with_name(tables.run_name(run))
-    data, _ = tables.data_of(part, options)
+    data = tables.data_of(part, options)
     after = options.work / "figures" / (part + "-depth")
-    made = tables.make(quiet(options, "depth", after, *DEPTHS[part][1]), after, "summary.json",
-                       lambda folder: shutil.copytree(before, folder))
-    if part == "mug" and made:
+    tables.make(quiet(options, "depth", after, *DEPTHS[part][1]), after, "summary.json", [before],
+                lambda folder: shutil.copytree(before, folder))
+    if part == "mug" and not (after / "mesh_views.png").exists():
         subprocess.run(quiet(options, "mesh", after), check=True, stdout=subprocess.DEVNULL)
     metrics = after.with_name(after.name + "-metrics")
-    run_again(options, metrics, "metrics.json", ["eval", after, "--truth", data, "-o", metrics], made)
+    run_again(options, metrics, "metrics.json", ["eval", after, "--truth", data, "-o", metrics], [after])
     return before, after, metrics
 
 
@@ -153,7 +150,7 @@ def draw(options):
     measured = {}
     for part, (view, _, number) in DEPTHS.items():
         before, after, metrics = depth_of(part, options)
-        images = tables.data_of(part, options)[0] / "images"
+        images = tables.data_of(part, options) / "images"
         photo = next(images.glob(view + ".*"))
         name = f"figure_{number.replace('.', '_')}.jpg"
         sheet(options, name, 3, 300, [photo, before / "depth" / (view + ".png"), after / "depth" / (view + ".png")])

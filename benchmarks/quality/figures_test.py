@@ -8,6 +8,7 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import figures  # noqa: E402
+import tables  # noqa: E402
 
 
 def method(within, sigma):
@@ -34,6 +35,7 @@ class Page(unittest.TestCase):
         self.assertTrue(page.endswith("## By hand\n\nWhy.\n"))
 
     def test_finest_level_is_that_of_the_tables(self):
+        self.assertEqual(figures.voxels_of(figures.LEVELS[-1]), tables.parse([]).resolution)
         self.assertEqual([figures.voxels_of(level) for level in figures.LEVELS], [64, 128, 256])
 
 

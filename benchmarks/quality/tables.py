@@ -88,6 +88,11 @@ WORLDS = {
 }
 # A still life in a room that goes on beyond the box; nothing is masked.
 ROOM, ROOM_RESOLUTION, ROOM_SHARES = "table", 160, (0.5, 1.0)  # ..., voxels, percent of the box's diagonal
+# The default run at other thresholds: of opacity, of confidence.
+THRESHOLDED = ["plane", "head", "shared-plane", "shared-head"]
+THRESHOLDS = [(0.04, 0.001), (0.1, 0.001), (0.2, 0.001), (OPACITY_THRESHOLD, 0.001), (0.5, 0.001), (OPACITY_THRESHOLD, 0.05)]
+BEST = ("posterior", "gaussian", "luv")  # the default choice
+
 COLUMNS = [("voxels", "voxels"), ("close", "within 4 voxels %"), ("opacity", "weighted mean opacity %"),
            ("covered", "surface covered %"), ("rms", "RMS %"), ("depth_1", "depth within 1 voxel %"),
            ("depth_4", "depth within 4 voxels %"), ("f_score", "F at 1 % of the diagonal")]
@@ -118,6 +123,11 @@ def resolution_of(run, resolution):
     return RULES[run[1]].resolution or resolution
 
 
+def along_the_box(run, resolution):
+    """The same as text; empty where voxels have a size of their own."""
+    return "" if WORLDS[run[0]].size else str(resolution_of(run, resolution))
+
+
 def metrics_folder(run, options):
     return options.work / str(resolution_of(run, options.resolution)) / (run_name(run) + "-metrics")
 
@@ -144,15 +154,26 @@ def digest(program):
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else ""
 
 
-def make(command, folder, done, prepare=lambda folder: None):
+def stamp_of(folder):
+    """The file that says what a folder was made by."""
+    return folder.with_name(folder.name + ".command")
+
+
+def made_by(folder):
+    """What a folder was made by; empty where that is not known, as of data that were not made here."""
+    return stamp_of(folder).read_text() if stamp_of(folder).exists() else ""
+
+
+def make(command, folder, done, sources=(), prepare=lambda folder: None):
     """Runs a command, unless the file `done` of its folder is there and came from the same program and command.
 
+    `sources` are the folders that it reads: the folder is made again where one of them was made by something else.
     `prepare` is called with the folder, which is not there then, before the command is run.
     """
-    stamp = folder.with_name(folder.name + ".command")
-    text = shlex.join(command)
-    made_by = f"{text}\n{digest(command[0])}\n"
-    if (folder / done).exists() and stamp.exists() and stamp.read_text() == made_by:
+    stamp, text = stamp_of(folder), shlex.join(command)
+    of_sources = hashlib.sha256("".join(made_by(source) for source in sources).encode()).hexdigest()[:16]
+    by = f"{text}\n{digest(command[0])}\n{of_sources}\n"
+    if (folder / done).exists() and stamp.exists() and stamp.read_text() == by:
         return False
     stamp.unlink(missing_ok=True)
     shutil.rmtree(folder, ignore_errors=True)
@@ -161,7 +182,7 @@ def make(command, folder, done, prepare=lambda folder: None):
     begun = time.monotonic()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     print(f"  {time.monotonic() - begun:.0f} s", flush=True)
-    stamp.write_text(made_by)
+    stamp.write_text(by)
     return True
 
 
@@ -172,52 +193,72 @@ def share_of_diagonal(dataset, percent):
 
 
 def make_world(name, options):
-    """The folder of a world that is made, and whether it has been made anew."""
+    """The folder of a world, made where it is not there."""
     data = options.work / name
-    return data, make([str(options.roxel), "synth", name, "-o", str(data), "--seed", str(SEED), "--quiet"], data,
-                      "transforms.json")
+    make([str(options.roxel), "synth", name, "-o", str(data), "--seed", str(SEED), "--quiet"], data, "transforms.json")
+    return data
 
 
 def data_of(name, options):
-    """The data set of a part of the page and whether it has been made anew; None where it is not there."""
+    """The data set of a part of the page; None where it is not there."""
     world = WORLDS[name]
     if world.shared:
-        return shared_folder(world.data), False
+        return shared_folder(world.data)
     return make_world(world.data or name, options)
+
+
+def sky_of(data, options):
+    """The folder of a data set's skies, made where it is not there."""
+    sky = data.with_name(data.name + "-sky")
+    make([str(options.roxel), "sky", str(data), "-o", str(sky), "--no-pictures", "--quiet"], sky, "summary.json", [data])
+    return sky
 
 
 def measure(run, options):
     """The folder with a run's metrics, made where it is not there; None where its data are not."""
     roxel = str(options.roxel)
     metrics, world = metrics_folder(run, options), WORLDS[run[0]]
-    data, anew = data_of(run[0], options)
+    data = data_of(run[0], options)
     if data is None:
         return None
     metrics.parent.mkdir(parents=True, exist_ok=True)
     made = metrics.with_name(run_name(run))
-    sky = data.with_name(data.name + "-sky")
-    if "SKY" in world.light:
-        anew = make([roxel, "sky", str(data), "-o", str(sky), "--no-pictures", "--quiet"], sky, "summary.json") or anew
+    sky = sky_of(data, options) if "SKY" in world.light else None
     command = [roxel, "reconstruct", str(data), "-o", str(made), *reconstruct_options(run, options.resolution, sky)]
-    if make([*command, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet"], made, "summary.json") or anew:
-        shutil.rmtree(metrics, ignore_errors=True)
+    make([*command, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet"], made, "summary.json",
+         [data, sky] if sky else [data])
     make([roxel, "eval", str(made), "--truth", str(data), "-o", str(metrics), "--opacity-threshold",
           str(OPACITY_THRESHOLD), "--distances", f"{share_of_diagonal(data, 1):.6g}",
           *(["--section=" + world.through] if world.through else []), "--quiet"],
-         metrics, "metrics.json")
+         metrics, "metrics.json", [made])
     return metrics
+
+
+def threshold_folder(run, thresholds, options):
+    return metrics_folder(run, options).with_name(run_name(run) + "-at-{:g}-{:g}".format(*thresholds))
+
+
+def measure_thresholds(run, options):
+    """Metrics of a run at each of THRESHOLDS; nothing where its data are not there."""
+    metrics, data = measure(run, options), data_of(run[0], options)
+    if metrics is None:
+        return
+    made = metrics.with_name(run_name(run))
+    for opacity, confidence in THRESHOLDS:
+        folder = threshold_folder(run, (opacity, confidence), options)
+        make([str(options.roxel), "eval", str(made), "--truth", str(data), "-o", str(folder), "--opacity-threshold", str(opacity),
+              "--confidence-threshold", str(confidence), "--quiet"], folder, "metrics.json", [made])
 
 
 def measure_room(options):
     """The folder with the room's metrics: the whole default run, with depth refined and a surface."""
-    data, anew = make_world(ROOM, options)
+    data = make_world(ROOM, options)
     made, metrics = options.work / f"{ROOM}-{ROOM_RESOLUTION}", options.work / f"{ROOM}-{ROOM_RESOLUTION}-metrics"
-    if make([str(options.roxel), "reconstruct", str(data), "-o", str(made), "--resolution", str(ROOM_RESOLUTION), "--no-report",
-             "--quiet"], made, "summary.json") or anew:
-        shutil.rmtree(metrics, ignore_errors=True)
+    make([str(options.roxel), "reconstruct", str(data), "-o", str(made), "--resolution", str(ROOM_RESOLUTION), "--no-report",
+          "--quiet"], made, "summary.json", [data])
     distances = ",".join(f"{share_of_diagonal(data, share):.6g}" for share in ROOM_SHARES)
     make([str(options.roxel), "eval", str(made), "--truth", str(data), "-o", str(metrics), "--distances", distances, "--quiet"],
-         metrics, "metrics.json")
+         metrics, "metrics.json", [made])
     return metrics
 
 
@@ -263,9 +304,6 @@ def choice_name(choice):
 
 def world_table(world, results, resolution):
     """One world's table: the thesis's rows first, then ours for each update rule."""
-    def along(run):
-        return str(resolution_of(run, resolution)) if not WORLDS[world].size else "-"
-
     lines = [row(["rule", "along the box", "agreement"] + [title for _, title in COLUMNS]),
              row(["---", "---:", "---"] + ["---:"] * len(COLUMNS))]
     for choice, known in thesis_rows(world).items():
@@ -278,7 +316,7 @@ def world_table(world, results, resolution):
             values = results.get(run)
             if values:
                 rule = RULES[update].update[1]
-                lines.append(row([f"ours, `{rule}`" if rule == "posterior" else f"the thesis's, `{rule}`", along(run), choice_name(choice)] +
+                lines.append(row([f"ours, `{rule}`" if rule == "posterior" else f"the thesis's, `{rule}`", along_the_box(run, resolution) or "-", choice_name(choice)] +
                                  [cell(key, values[key]) for key, _ in COLUMNS]))
     return lines
 
@@ -307,6 +345,11 @@ def copy_pictures(results, folders, docs):
                 (docs / target).write_text(without_specks(text) if WORLDS[run[0]].data == "street" else text)
 
 
+def shown_choices(world):
+    """Of the thesis's, worst first as there."""
+    return [choice for choice in THESIS_ORDER[::-1] if choice in WORLDS[world].choices]
+
+
 def with_pictures(world):
     return [update for update in WORLDS[world].updates if RULES[update].pictures]
 
@@ -318,7 +361,7 @@ def render_sheet(world, results, options):
         return (options.docs / name).exists()
     photo = next((str(p) for p in [(options.work / (WORLDS[world].data or world) / "images" / (view + suffix))
                                    for suffix in (".png", ".exr")] if p.exists()), "-")
-    choices, files = THESIS_ORDER[::-1], []
+    choices, files = shown_choices(world), []
     for update in with_pictures(world):
         runs = [(world, update, *choice) for choice in choices]
         renders = [metrics_folder(run, options).with_name(run_name(run)) / "render" / (view + ".png") for run in runs]
@@ -332,7 +375,7 @@ def render_sheet(world, results, options):
 
 def picture_table(world, results):
     """Sections and histograms, a column for each of the thesis's choices, worst first as there."""
-    choices = THESIS_ORDER[::-1]
+    choices = shown_choices(world)
     lines = [row(["rule"] + [choice_name(choice) for choice in choices]), row(["---"] * (1 + len(choices)))]
     for update in with_pictures(world):
         for i in range(len(WORLDS[world].sections) + 1):
@@ -366,10 +409,24 @@ def ordering_table(results, resolution):
     for world in WORLDS:
         for update in WORLDS[world].updates:
             found = [ordering(world, update, key, results, key == "rms") for key, _ in keys]
-            along = "-" if WORLDS[world].size else str(resolution_of((world, update), resolution))
+            along = along_the_box((world, update), resolution) or "-"
             if None not in found:
                 lines.append(row([world, f"`{RULES[update].update[1]}`", along, *found]))
     return lines
+
+
+def threshold_part(results):
+    """Opacity, closeness and covering by threshold; `results`: figures by world and thresholds."""
+    worlds = [world for world in THRESHOLDED if any(key[0] == world for key in results)]
+    lines = ["## The default at other thresholds", "",
+             "Weighted mean opacity / voxels within four / surface covered, in percent, of Gaussian Luv with `posterior`, by the opacity and the confidence from "
+             "which a voxel counts. (0.04 is what `reconstruct` saves; a confidence of 0.05 leaves out what hardly a ray reaches.)", "",
+             row(["opacity", "confidence", *worlds]), row(["---:"] * 2 + ["---"] * len(worlds))]
+    for thresholds in THRESHOLDS:
+        found = [results.get((world, thresholds)) for world in worlds]
+        lines.append(row(["{:g}".format(t) for t in thresholds] +
+                         [" / ".join(cell(key, f[key]) for key in ("opacity", "close", "covered")) if f else "-" for f in found]))
+    return lines + [""]
 
 
 def room_part(metrics):
@@ -420,34 +477,38 @@ def world_part(world, results, sheets, resolution):
         return lines
     if world in sheets:
         rules = ", then ".join(f"`{update}`" for update in with_pictures(world))
-        lines += [f"Photograph {WORLDS[world].view} and its renders with exponential RGB, Gaussian RGB, Gaussian Luv; {rules}:", "",
+        shown = ", ".join(choice_name(choice) for choice in shown_choices(world))
+        lines += [f"Photograph {WORLDS[world].view} and its renders with {shown}; {rules}:", "",
                   f"![renders of {world}]({world}-renders.jpg)", ""]
     thesis = f", as figures {WORLDS[world].figures} of the thesis" if WORLDS[world].figures else ""
+    if WORLDS[world].data == "street":
+        thesis += f"; pieces of the outline shorter than {SHORTEST} voxels, which are leaves, are not drawn"
     return lines + [f"Cross-sections (opacity in grey, the true outline in red) and voxels by distance{thesis}:", "",
                     *picture_table(world, results), ""]
 
 
-def document(results, resolution, remarks="", room=None, sheets=()):
+def document(results, resolution, remarks="", room=None, sheets=(), thresholds={}):
     lines = HEAD.format(resolution=resolution, coarse=COARSE, seed=SEED, opacity=OPACITY_THRESHOLD,
                         roxels="`" + " ".join(RULES["roxels"].update) + "`").splitlines() + [""]
     for world in WORLDS:
         if any(run[0] == world for run in results):
             lines += world_part(world, results, sheets, resolution)
+    lines += threshold_part(thresholds) if thresholds else []
     lines += room_part(room) if room else []
     lines += ["## Does the thesis's order hold: Luv before RGB before exponential?", "", *ordering_table(results, resolution), ""]
     return "\n".join(lines) + (f"\n{remarks.strip()}\n" if remarks.strip() else "")
 
 
-def write_csv(path, results):
+def write_csv(path, results, resolution):
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["source", "world", "update", "agreement", "color_space"] + [key for key, _ in COLUMNS])
+        writer.writerow(["source", "world", "update", "along_the_box", "agreement", "color_space"] + [key for key, _ in COLUMNS])
         for world in WORLDS:
             for choice, known in thesis_rows(world).items():
-                writer.writerow(["thesis", world, "", *choice, *known] + [""] * (len(COLUMNS) - 3))
+                writer.writerow(["thesis", world, "", "", *choice, *known] + [""] * (len(COLUMNS) - 3))
         for run, values in results.items():
             shown = ["" if values[key] is None else f"{values[key]:.6g}" for key, _ in COLUMNS]
-            writer.writerow(["roxel", *run, *shown])
+            writer.writerow(["roxel", run[0], RULES[run[1]].update[1], along_the_box(run, resolution), *run[2:], *shown])
 
 
 def add_places(parser):
@@ -482,20 +543,28 @@ def main(arguments):
     for run in wanted:
         if measure(run, options) is None:
             print(f"skipped: {run_name(run)}, as ROXEL_TEST_DATA has no {WORLDS[run[0]].data}", file=sys.stderr)
+        elif run[1:] == BEST and run[0] in THRESHOLDED:
+            measure_thresholds(run, options)
     if with_room:
         measure_room(options)
     there = lambda folder: (folder / "metrics.json").exists()
     folders = {run: metrics_folder(run, options) for run in all_runs()}
     results = {run: read_figures(folder) for run, folder in folders.items() if there(folder)}
     room = options.work / f"{ROOM}-{ROOM_RESOLUTION}-metrics" / "metrics.json"
+    at = {(world, t): threshold_folder((world, *BEST), t, options) for world in THRESHOLDED for t in THRESHOLDS}
+    thresholds = {key: read_figures(folder) for key, folder in at.items() if there(folder)}
+    programs = {made_by(folder).splitlines()[1] for folder in [*folders.values(), *at.values(), room.parent]
+                if there(folder) and made_by(folder)}
+    if len(programs) > 1:
+        print(f"tables: the page holds measures by {len(programs)} builds of the program", file=sys.stderr)
     options.docs.mkdir(parents=True, exist_ok=True)
     copy_pictures(results, folders, options.docs)
     sheets = [world for world in WORLDS if render_sheet(world, results, options)]
     remarks = pathlib.Path(__file__).with_name("tables_remarks.md")
     (options.docs / "tables.md").write_text(
         document(results, options.resolution, remarks.read_text() if remarks.exists() else "",
-                 json.loads(room.read_text()) if room.exists() else None, sheets))
-    write_csv(options.docs / "tables.csv", results)
+                 json.loads(room.read_text()) if room.exists() else None, sheets, thresholds))
+    write_csv(options.docs / "tables.csv", results, options.resolution)
     print(f"{len(results)} of {len(all_runs())} runs -> {options.docs / 'tables.md'}")
 
 

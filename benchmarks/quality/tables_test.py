@@ -56,6 +56,14 @@ class Tables(unittest.TestCase):
     def test_the_rule_as_printed_is_told_in_full(self):
         self.assertIn("`--update roxels --no-predictive --outlier 0`", tables.document({}, 77))
 
+    def test_thresholds_have_a_row_each_and_worlds_a_column(self):
+        results = {("plane", thresholds): tables.figures(metrics(opacity=thresholds[0])) for thresholds in tables.THRESHOLDS}
+        lines = tables.threshold_part(results)
+        self.assertIn("| 0.04 | 0.001 | 4.0 / 90.0 / 95.5 |", lines)
+        self.assertIn("| 0.3 | 0.05 | 30.0 / 90.0 / 95.5 |", lines)
+        self.assertEqual(len([line for line in lines if line.startswith("| 0")]), len(tables.THRESHOLDS))
+        self.assertIn("## The default at other thresholds", tables.document({}, 77, thresholds=results))
+
     def test_the_rooms_points_and_surface_have_a_row_each(self):
         surfaces = [{"name": name, "within": [{"distance": d, "precision": 0.5, "recall": 0.25, "f_score": f} for d, f in ((1, 0.333), (2, 0.75))]}
                     for name in ("voxels", "depth points", "mesh")]
@@ -88,11 +96,11 @@ class Tables(unittest.TestCase):
         self.assertTrue(page.endswith("## By hand\n\nWhy.\n"))
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "tables.csv"
-            tables.write_csv(path, results)
+            tables.write_csv(path, results, 77)
             lines = path.read_text().splitlines()
         self.assertEqual(len(lines), 1 + 12 + 3)
-        self.assertIn("thesis,head,,gaussian,luv,62996,64.2,59.9,,,,,", lines)
-        self.assertIn("roxel,plane,posterior,gaussian,luv,1000,90,80,95.5,5,61,84,0.9876", lines)
+        self.assertIn("thesis,head,,,gaussian,luv,62996,64.2,59.9,,,,,", lines)
+        self.assertIn("roxel,plane,posterior,77,gaussian,luv,1000,90,80,95.5,5,61,84,0.9876", lines)
 
 
     def test_every_picture_of_the_page_is_copied(self):
@@ -165,12 +173,20 @@ class Runs(unittest.TestCase):
                 self.assertEqual(tables.make([str(program)], folder, "done"), made)
             self.assertEqual((folder / "by").read_text(), "two\n")
 
+    def test_a_run_is_made_again_after_what_it_reads(self):
+        with tempfile.TemporaryDirectory() as name:
+            world, run = pathlib.Path(name) / "world", pathlib.Path(name) / "run"
+            command = lambda folder, more="": ["sh", "-c", f"mkdir {folder} && touch {folder}/done {more}"]
+            for seed, made in [("", True), ("", False), ("--seed 2", True), ("--seed 2", False)]:
+                tables.make(["sh", "-c", f"mkdir {world}; touch {world}/done; : {seed}"], world, "done")
+                self.assertEqual(tables.make(command(run), run, "done", [world]), made)
+
     def test_a_prepared_folder_is_there_for_the_command(self):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name) / "run"
             command = ["sh", "-c", f"mv {folder}/begun {folder}/done"]
             prepare = lambda f: (f.mkdir(), (f / "begun").write_text("x"))
-            self.assertEqual([tables.make(command, folder, "done", prepare) for _ in range(2)], [True, False])
+            self.assertEqual([tables.make(command, folder, "done", (), prepare) for _ in range(2)], [True, False])
 
     def test_shares_are_of_the_data_sets_diagonal(self):
         with tempfile.TemporaryDirectory() as name:

@@ -103,7 +103,8 @@ class Measures(EvalCase):
             self.assertIn(part, text)
         found = json.loads((out / "metrics.json").read_text())
         self.assertEqual([s["name"] for s in found["surfaces"]],
-                         ["depth points", "depth points that 2 views agree on", "refined depth points", "voxels"])
+                         ["depth points", "depth points that 2 views agree on", "depth points of sigma within 4 voxels",
+                          "refined depth points", "voxels"])
         self.assertTrue(0 < found["volume"]["share_within_4_voxels"] <= 1)
         self.assertTrue(0 < found["volume"]["weighted_mean_opacity"] < 1)
         self.assertEqual(len(found["images"]["views"]), 4)
@@ -197,9 +198,9 @@ class Measures(EvalCase):
                 (run / f"depth/{name}.exr").write_bytes(exr(planes))
             return self.measures("--truth", self.mesh, "--dataset", data, run=run)["surfaces"]
 
-        every, agreed, _ = points(0.5)
+        every, agreed = points(0.5)[:2]
         self.assertEqual(agreed["points"], every["points"])
-        every, agreed, _ = points(1.5)
+        every, agreed = points(1.5)[:2]
         self.assertGreater(every["points"], 100)
         self.assertEqual((agreed["points"], agreed["accuracy_90"]), (0, None))
 

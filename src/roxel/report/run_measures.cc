@@ -155,9 +155,10 @@ std::string cell(const std::string& text) {
   return quoted + "\"";
 }
 
-std::string depth_csv(const std::vector<NamedDepthAccuracy>& views) {
-  const DepthAccuracy all = total_depth(views);
-  std::string csv = "view,true_pixels,share_found";
+/// A line each of what is named: views, or methods.
+std::string depth_csv(const char* named, const std::vector<NamedDepthAccuracy>& entries) {
+  const DepthAccuracy& all = entries.front().accuracy;
+  std::string csv = std::string(named) + ",true_pixels,share_found";
   for (const double t : all.thresholds) csv += ",within_" + key(t) + "_voxels";
   for (const double d : all.distances) csv += ",within_" + key(d) + "_units";
   csv += ",share_of_empty_given_depth,bias_voxels,coverage_68,coverage_95\n";
@@ -169,9 +170,16 @@ std::string depth_csv(const std::vector<NamedDepthAccuracy>& views) {
     csv += formatted(",%.6g,%.6g,%.6g,%.6g\n", a.share_false(), a.bias_voxels(), a.share_within_sigma(1),
                      a.share_within_sigma(1.96));
   };
-  for (const NamedDepthAccuracy& view : views) row(view.name, view.accuracy);
-  row("all", all);
+  for (const NamedDepthAccuracy& entry : entries) row(entry.name, entry.accuracy);
   return csv;
+}
+
+std::string color_csv(const ColorAccuracy& color) {
+  return "pixels,scale,mean_delta_e_2000,median_delta_e_2000,delta_e_2000_90,mean_relative_error,median_"
+         "relative_error\n" +
+         formatted("%lld,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", static_cast<long long>(color.pixels), color.scale,
+                   color.mean_delta_e, color.median_delta_e, color.delta_e_90, color.mean_relative,
+                   color.median_relative);
 }
 
 std::string surfaces_csv(const std::vector<NamedSurfaceAccuracy>& surfaces) {
@@ -351,15 +359,21 @@ ordered_json to_json(const RunMeasures& measures) {
 std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& measures) {
   std::vector<std::pair<std::string, std::string>> tables;
   if (!measures.depth.empty()) {
-    tables.emplace_back("depth.csv", depth_csv(measures.depth));
-    tables.emplace_back("depth_error_over_sigma.csv", calibration_csv(total_depth(measures.depth)));
+    const DepthAccuracy total = total_depth(measures.depth);
+    std::vector<NamedDepthAccuracy> views = measures.depth;
+    views.push_back({"all", total});
+    tables.emplace_back("depth.csv", depth_csv("view", views));
+    tables.emplace_back("depth_error_over_sigma.csv", calibration_csv(total));
   }
+  if (!measures.depth_methods.empty())
+    tables.emplace_back("depth_methods.csv", depth_csv("method", measures.depth_methods));
   if (measures.opacity_reliability)
     tables.emplace_back("opacity_reliability.csv", reliability_csv(*measures.opacity_reliability));
   if (!measures.surfaces.empty()) tables.emplace_back("surfaces.csv", surfaces_csv(measures.surfaces));
   if (measures.volume) tables.emplace_back("voxel_distances.csv", histogram_csv(measures.volume->histogram));
   if (!measures.images.empty()) tables.emplace_back("images.csv", quality_csv(measures.images));
   if (!measures.held_out.empty()) tables.emplace_back("held_out.csv", quality_csv(measures.held_out));
+  if (measures.color) tables.emplace_back("color.csv", color_csv(*measures.color));
   if (!measures.light.empty()) tables.emplace_back("light.csv", csv_table(measures.light));
   if (!measures.skies.empty()) tables.emplace_back("skies.csv", csv_table(measures.skies));
   return tables;

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "roxel/report/measure_plots.h"
 
@@ -87,6 +89,19 @@ TEST(RunMeasures, TablesHaveAHeadAndALineEach) {
 
 TEST(RunMeasures, ACommaInANameIsQuoted) {
   EXPECT_THAT(csv_tables(some_measures())[0].second, HasSubstr("\n\"a,b\",1,1,"));
+}
+
+TEST(RunMeasures, MethodsAndColourHaveTables) {
+  RunMeasures m = some_measures();
+  m.depth_methods = {{"volume", m.depth[0].accuracy}, {"bp", m.depth[1].accuracy}};
+  std::map<std::string, std::string> tables;
+  for (const auto& [name, table] : csv_tables(m)) tables[name] = table;
+  EXPECT_THAT(tables["depth.csv"], HasSubstr("\nall,2,1,0.5,"));
+  EXPECT_THAT(tables["depth_methods.csv"], HasSubstr("method,true_pixels,"));
+  EXPECT_THAT(tables["depth_methods.csv"], HasSubstr("\nvolume,1,1,1,"));
+  EXPECT_THAT(tables["depth_methods.csv"], HasSubstr("\nbp,1,1,0,"));
+  EXPECT_THAT(tables["depth_methods.csv"], Not(HasSubstr("all")));
+  EXPECT_THAT(tables["color.csv"], HasSubstr("\n1,"));
 }
 
 TEST(RunMeasures, TextIsShortWhereViewsAreMany) {

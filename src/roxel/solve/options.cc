@@ -109,9 +109,8 @@ void add_sampling(OptionTable<Options>& table) {
       .source("one image, one observation; chosen when 4 and 1 were compared, figures not kept");
   table.add("outline-weight", &Options::outline_weight)
       .help(
-          "Where masks say what is background: weight of pixels that the object's outline halves; the less "
-          "it "
-          "takes of a pixel, or leaves, the nearer to 1. 1: all as any other")
+          "Where masks say what is background: weight of pixels that the object's outline halves; of less "
+          "even halves it is nearer to 1. 1: all pixels alike")
       .range(0, 1)
       .source("docs/background.md; masks of all or nothing have no such pixels");
 }

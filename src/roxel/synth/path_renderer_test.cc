@@ -129,6 +129,7 @@ TEST(PathRenderer, APolesShadowPointsAwayFromTheSun) {
     const Picture picture = studio.picture(camera, only_sun(to_sun), 1);
     const float lit = to_sun.normalized().z();
     Vector3d tip = Vector3d::Zero();
+    int on_ground = 0, dark_pixels = 0, half_dark = 0;
     for (int y = 0; y < 160; ++y)
       for (int x = 0; x < 160; ++x) {
         const Ray ray = camera.ray(x + 0.5, y + 0.5);
@@ -136,10 +137,12 @@ TEST(PathRenderer, APolesShadowPointsAwayFromTheSun) {
         const bool ground = std::abs(*picture.depth.pixel(x, y) - 8) < 1e-3f;
         const bool dark = ground && picture.rgb.pixel(x, y)[0] < 0.5f * lit;
         if (dark && p.norm() > tip.norm()) tip = p;
-        if (ground && !dark) {
-          EXPECT_NEAR(picture.rgb.pixel(x, y)[0], lit, 0.51f * lit);
-        }
+        on_ground += ground, dark_pixels += dark;
+        half_dark += ground && !dark && std::abs(picture.rgb.pixel(x, y)[0] / lit - 1) > 0.02f;
       }
+    EXPECT_GT(on_ground, 20000);  // of 25600
+    EXPECT_GT(dark_pixels, 20);
+    EXPECT_LT(half_dark, 2 * dark_pixels + 20);  // at the shadow's rim
     const Vector3f expected = -to_sun / to_sun.z();
     EXPECT_LT((tip.head<2>().cast<float>() - expected.head<2>()).norm(), 0.1f) << to_sun.transpose();
   }

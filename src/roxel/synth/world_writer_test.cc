@@ -176,13 +176,16 @@ TEST(WorldWriter, StreetIsRadianceOfNodesWithDatesPlaceAndSkies) {
   const World world = make_world(WorldKind::kStreet, {22, 16, 16, 1});
   const Image &photograph = made.images.at("images/n01_00.exr"), &map = made.images.at("sky/n01.exr");
   const Mask& mask = made.masks.at("mask/n01_00.png");
+  int sky_pixels = 0;
   for (int x = 0; x < 16; ++x) {
     if (mask.at(x, 0) > 0) continue;
+    ++sky_pixels;
     const Eigen::Vector3f d = world.shots[20].camera.ray(x + 0.5, 0.5).direction.normalized().cast<float>();
     const Eigen::Vector2f at = map_position(map, d);
     EXPECT_NEAR(photograph.pixel(x, 0)[1] / map.pixel(static_cast<int>(at.x()), static_cast<int>(at.y()))[1],
                 1, 0.1);
   }
+  EXPECT_GT(sky_pixels, 8);
 }
 
 TEST(WorldWriter, PosesAloneAreMovedByPoseNoise) {
