@@ -225,8 +225,9 @@ void remove_older_measures(const fs::path& folder) {
   if (!fs::is_regular_file(folder / "metrics.json")) return;
   for (const char* name : {"metrics.json", "report.html", "section_x.svg", "section_y.svg", "section_z.svg"})
     remove_file(folder / name);
-  for (const char* name : {"depth", "depth_error_over_sigma", "opacity_reliability", "surfaces",
-                           "voxel_distances", "voxel_opacities", "images", "held_out", "light", "skies"})
+  for (const char* name :
+       {"depth", "depth_methods", "depth_error_over_sigma", "opacity_reliability", "surfaces", "color",
+        "voxel_distances", "voxel_opacities", "images", "held_out", "light", "skies"})
     for (const char* suffix : {".csv", ".svg"}) remove_file(folder / (std::string(name) + suffix));
   const auto surface_plot = [&](int number) {
     return folder / ("surface_" + std::to_string(number) + ".svg");
