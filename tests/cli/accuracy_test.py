@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What `roxel` reaches on ray-traced worlds with known depth and surface: figures below which it must not fall. Needs the data sets
-plane, head and courtyard, in the folder that the environment variable ROXEL_TEST_DATA names or in a folder shared/data above this one.
+"""What `roxel` reaches on ray-traced worlds with known depth and surface: figures below which it must not fall. All but Worlds
+need the data sets plane, head and courtyard, in the folder that the environment variable ROXEL_TEST_DATA names or in a folder shared/data above this one.
 
     accuracy_test.py ROXEL [unittest arguments, e.g. Plane]
 """
@@ -12,6 +12,7 @@ import tempfile
 import unittest
 
 import program
+from program import Case
 
 
 def data_set(name):
@@ -102,6 +103,26 @@ class Head(AccuracyCase):
     def test_the_volume_and_its_renders(self):
         self.check_volume(84, 97.2, 2, 2.95)
         self.check_voxels(86.5, 98, 95.5)
+
+
+class Worlds(Case):
+    """The program's own worlds at a coarse resolution, so that there are floors without data sets, too."""
+
+    # Weighted mean opacity, share of voxels within four, of the surface covered; at most RMS over the object. In percent.
+    FLOORS = {"plane": (88.5, 99.9, 99, 9.8), "head": (87.5, 99.5, 97, 6.7), "mug": (88, 82, 91.5, 6.4)}
+
+    def test_voxels_and_renders(self):
+        for world, (opacity, within_4, covered, rms) in self.FLOORS.items():
+            with self.subTest(world):
+                data, out, measures = (self.folder / f"{world}{part}" for part in ("", "-run", "-metrics"))
+                self.succeed("synth", world, "-o", data, "--quiet")
+                self.succeed("reconstruct", data, "-o", out, "--resolution", 96, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet")
+                self.succeed("eval", out, "--truth", data, "-o", measures, "--opacity-threshold", 0.3, "--quiet")
+                found = json.loads((measures / "metrics.json").read_text())
+                self.assertGreaterEqual(100 * found["volume"]["weighted_mean_opacity"], opacity)
+                self.assertGreaterEqual(100 * found["volume"]["share_within_4_voxels"], within_4)
+                self.assertGreaterEqual(100 * found["volume"]["share_of_surface_covered"], covered)
+                self.assertLessEqual(100 * found["images"]["object"]["rms"], rms)
 
 
 class Courtyard(AccuracyCase):
