@@ -21,6 +21,13 @@ def data_set(name):
     return next((folder / name for folder in folders if (folder / name).is_dir()), None)
 
 
+def check_voxels(case, volume, opacity, within_4, covered):
+    """Least distance-weighted mean opacity, shares of voxels near the surface and of the surface near one, in percent."""
+    case.assertGreaterEqual(100 * volume["weighted_mean_opacity"], opacity)
+    case.assertGreaterEqual(100 * volume["share_within_4_voxels"], within_4)
+    case.assertGreaterEqual(100 * volume["share_of_surface_covered"], covered)
+
+
 class AccuracyCase(program.Case):
     """A run of one data set, measured against the truth."""
 
@@ -54,13 +61,6 @@ class AccuracyCase(program.Case):
         self.assertLess(100 * self.metrics["depth"]["share_of_empty_given_depth"], empty_given_depth)
         self.assertLessEqual(self.metrics["reprojection_rms_percent"], rms_percent)
 
-    def check_voxels(self, opacity, within_4, covered):
-        """Least distance-weighted mean opacity, shares of voxels near the surface and of the surface near one, in percent."""
-        volume = self.metrics["volume"]
-        self.assertGreaterEqual(100 * volume["weighted_mean_opacity"], opacity)
-        self.assertGreaterEqual(100 * volume["share_within_4_voxels"], within_4)
-        self.assertGreaterEqual(100 * volume["share_of_surface_covered"], covered)
-
     def f_score(self, share_of_diagonal):
         within = self.metrics["surfaces"][-1]["within"]
         return min(within, key=lambda entry: abs(entry["distance"] - share_of_diagonal * self.diagonal))["f_score"]
@@ -88,7 +88,7 @@ class Plane(AccuracyCase):
 
     def test_the_volume_and_its_renders(self):
         self.check_volume(97.5, 99.8, 3, 2.3)
-        self.check_voxels(90, 99.9, 95)
+        check_voxels(self, self.metrics["volume"], 90, 99.9, 95)
 
     def test_the_median_of_the_surface_is_near_a_hundredth_of_a_percent_of_the_diagonal(self):
         self.assertLess(self.metrics["surfaces"][-1]["median_to_truth"], 1e-4 * self.diagonal)
@@ -102,7 +102,7 @@ class Head(AccuracyCase):
 
     def test_the_volume_and_its_renders(self):
         self.check_volume(84, 97.2, 2, 2.95)
-        self.check_voxels(86.5, 98, 95.5)
+        check_voxels(self, self.metrics["volume"], 86.5, 98, 95.5)
 
 
 class Worlds(Case):
@@ -119,9 +119,7 @@ class Worlds(Case):
                 self.succeed("reconstruct", data, "-o", out, "--resolution", 96, "--no-bp", "--no-refine", "--no-mesh", "--no-report", "--quiet")
                 self.succeed("eval", out, "--truth", data, "-o", measures, "--opacity-threshold", 0.3, "--quiet")
                 found = json.loads((measures / "metrics.json").read_text())
-                self.assertGreaterEqual(100 * found["volume"]["weighted_mean_opacity"], opacity)
-                self.assertGreaterEqual(100 * found["volume"]["share_within_4_voxels"], within_4)
-                self.assertGreaterEqual(100 * found["volume"]["share_of_surface_covered"], covered)
+                check_voxels(self, found["volume"], opacity, within_4, covered)
                 self.assertLessEqual(100 * found["images"]["object"]["rms"], rms)
 
 
