@@ -8,6 +8,7 @@
 #include "roxel/base/error.h"
 #include "roxel/base/parallel.h"
 #include "roxel/eval/depth_points.h"
+#include "roxel/eval/display_gain.h"
 #include "roxel/eval/surface_sight.h"
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
@@ -15,7 +16,6 @@
 #include "roxel/io/sky_truth.h"
 #include "roxel/report/markup.h"
 #include "roxel/report/pictures.h"
-#include "roxel/solve/gains.h"
 #include "run_renderer.h"
 #include "view_writer.h"
 
@@ -337,24 +337,24 @@ class Measurement {
       return scene.value("light", nlohmann::json::object()).value("illumination", "none") == "gain";
     });
     if (gains)
-      out_.notes.push_back("held-out views: one gain a channel fitted to each, as the run did to its own");
+      out_.notes.push_back(
+          "held-out views: one gain a channel is fitted to each, the one that leaves the least error");
     for (const View& view : source_.held_out->dataset.views) {
       session_.context().throw_if_cancelled();
       Rendering rendering = renderer()(view, session_.context());
       const Photograph photo = source_.held_out->load(view);
-      if (gains) bring_to_light_of(photo, rendering);
-      out_.held_out.push_back(quality(view.name,
-                                      encoded_picture(rendering.rgb, 1, source_.picture_response()), photo,
-                                      object_mask(photo, rendering.opacity)));
+      const Mask object = object_mask(photo, rendering.opacity);
+      if (gains) bring_to_light_of(photo, object, rendering.rgb);
+      out_.held_out.push_back(
+          quality(view.name, encoded_picture(rendering.rgb, 1, source_.picture_response()), photo, object));
     }
   }
 
-  /// One gain a channel, as the run has fitted to the photographs that it was made from.
-  void bring_to_light_of(const Photograph& photo, Rendering& rendering) {
-    const auto gain = log_gain(photo, rendering, 1, 1);
-    if (!gain) return;
-    for (std::size_t i = 0; i < rendering.rgb.data().size(); ++i)
-      rendering.rgb.data()[i] *= static_cast<float>(std::exp((*gain)[i % 3]));
+  void bring_to_light_of(const Photograph& photo, const Mask& object, Image& rendered) const {
+    const auto gain =
+        display_gain(rendered, photo.rgb, source_.run.file.info.exposure, object, source_.picture_response());
+    for (std::size_t i = 0; i < rendered.data().size(); ++i)
+      rendered.data()[i] *= static_cast<float>(gain[i % 3]);
   }
 
   void measure_colors() {
