@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace roxel {
@@ -12,7 +13,8 @@ Image ramp(int side) {
   Image image(side, side, 3);
   for (int i = 0; i < side * side; ++i)
     for (int c = 0; c < 3; ++c)
-      image.data()[3 * i + c] = 0.02f + 0.4f * static_cast<float>((i * (7 + c)) % (side * side)) / (side * side);
+      image.data()[3 * i + c] =
+          0.02f + 0.4f * static_cast<float>((i * (7 + c)) % (side * side)) / (side * side);
   return image;
 }
 
@@ -38,8 +40,9 @@ TEST(DisplayGain, MakesTheErrorLeastThatADisplayShows) {
   const auto squares = [&](int c, double by) {
     double sum = 0;
     for (std::size_t i = c; i < photo.data().size(); i += 3)
-      sum += std::pow(encode(response, static_cast<float>(by) * rendered.data()[i]) -
-                          encode(response, photo.data()[i]), 2);
+      sum += std::pow(
+          encode(response, static_cast<float>(by) * rendered.data()[i]) - encode(response, photo.data()[i]),
+          2);
     return sum;
   };
   for (int c = 0; c < 3; ++c)
@@ -54,7 +57,8 @@ TEST(DisplayGain, LeavesOutWhatDoesNotCountAndWhatClips) {
   for (int i = 0; i < 1600; ++i) {
     counted.data()[i] = i < 800 ? 255 : 0;
     for (int c = 0; c < 3; ++c) {
-      // A light of three: the brighter third is above white on any display. The other half is of another light.
+      // A light of three: the brighter third is above white on any display. The other half is of another
+      // light.
       float& value = photo.data()[3 * i + c];
       value = i < 800 ? std::min(1.0f, 3 * value) : 0.1f * value;
     }
@@ -66,7 +70,11 @@ TEST(DisplayGain, LeavesOutWhatDoesNotCountAndWhatClips) {
 TEST(DisplayGain, IsOneWhereNothingIsSeen) {
   const Image black(8, 8, 3);
   for (const double gain : display_gain(black, ramp(8), 1, {}, {})) EXPECT_EQ(gain, 1);
-  for (const double gain : display_gain(ramp(8), ramp(8), 1, Mask(8, 8), {})) EXPECT_EQ(gain, 1);
+  Mask none(8, 8);
+  std::fill(none.data().begin(), none.data().end(), std::uint8_t{0});
+  Image other = ramp(8);
+  for (float& value : other.data()) value *= 2;
+  for (const double gain : display_gain(ramp(8), other, 1, none, {})) EXPECT_EQ(gain, 1);
 }
 
 }  // namespace
