@@ -16,7 +16,7 @@ struct SkyInput {
   std::string path, format;
   std::vector<SkyTask> tasks;
   std::vector<SkyPictureSource> pictures;  ///< of each task
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, warnings;  ///< of what shares a sky; not the reader's own
 };
 
 /// Throws InvalidInput, also for masks by hand that no image has.

@@ -2,6 +2,7 @@
 /// What a ray sees when it passes every voxel (docs/background.md).
 
 #include "roxel/infer/match.h"
+#include "roxel/infer/sample_view.h"
 
 namespace roxel {
 
@@ -9,18 +10,19 @@ enum class BackgroundKind {
   kNone,     ///< every ray ends in the volume: likelihood 0
   kUnknown,  ///< any colour of the gamut alike: a constant likelihood
   kKnown,    ///< one colour with a spread (black, or a constant one): agreement as for voxels
-  kMask,     ///< the share of the sample that the mask calls background
+  kMask,     ///< the share of the sample that the mask calls background; kUnknown for views without a mask
 };
 
 struct Background {
   BackgroundKind kind = BackgroundKind::kUnknown;
   float mean[3] = {0, 0, 0};  ///< kKnown: matching space
   float cov[6] = {0, 0, 0, 0, 0, 0};
-  float unknown_likelihood = 0.000320427527f;  ///< kUnknown: (2 pi)^{3/2} |S_min|^{1/2} / gamut volume
+  float unknown_likelihood = 0.000320427527f;  ///< of any colour: (2 pi)^{3/2} |S_min|^{1/2} / gamut volume
 };
 
-/// Likelihood p_bg of the sample if nothing in the volume stopped its ray.
-float background_likelihood(const Background& background, const MatchModel& model, const RegionStats& sample);
+/// Likelihood p_bg of the view's sample if nothing in the volume stopped its ray.
+float background_likelihood(const Background& background, const MatchModel& model, const SampleView& view,
+                            const RegionStats& sample);
 
 /// How surely the sample shows a *known* background, 0 to 1: such samples do not colour voxels.
 float known_background_share(const Background& background, const MatchModel& model,

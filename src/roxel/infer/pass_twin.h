@@ -61,10 +61,11 @@ inline double twin_known_share(const Background& background, const MatchModel& m
                         twin_matrix(background.cov) + twin_matrix(sample.cov));
 }
 
-inline double twin_background(const Background& background, const MatchModel& model,
+inline double twin_background(const Background& background, const MatchModel& model, bool masked,
                               const RegionStats& sample) {
   if (background.kind == BackgroundKind::kNone) return 0;
-  if (background.kind == BackgroundKind::kUnknown) return background.unknown_likelihood;
+  if (background.kind == BackgroundKind::kUnknown || (background.kind == BackgroundKind::kMask && !masked))
+    return background.unknown_likelihood;
   if (background.kind == BackgroundKind::kMask) return 1 - sample.foreground + model.outlier;
   return twin_known_share(background, model, sample) + model.outlier;
 }
@@ -191,7 +192,8 @@ class PassTwin {
         best = std::max(best, child.path_sum);
         node.children.push_back(std::move(child));
       }
-    node.background_likelihood = twin_background(options_.opacity.background, options_.opacity.model, stats);
+    node.background_likelihood = twin_background(options_.opacity.background, options_.opacity.model,
+                                                  view.pyramid->masked(), stats);
     node.path_sum += node.children.empty() ? node.background_likelihood : best;
     node.z =
         node.likelihood + node.transmittance * (node.children.empty() ? node.background_likelihood

@@ -99,6 +99,13 @@ BackgroundChoice chosen_kind(const ReconstructOptions& options) {
   throw_invalid("--background-color", "another --background", "--background constant, or none given");
 }
 
+[[noreturn]] void throw_without_sky(const Daylight* daylight) {
+  const std::string reasons = daylight ? reasons_without_light(*daylight) : "";
+  throw_invalid("--background sky",
+                "no photograph whose sky is known" + (reasons.empty() ? "" : ": " + reasons),
+                "photographs that show the sky, or another --background");
+}
+
 }  // namespace
 
 BorderSample sample_border(const Photograph& photo) {
@@ -118,11 +125,13 @@ BorderSample sample_border(const Photograph& photo) {
 }
 
 void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options,
-                       Scene& scene) {
+                       const Daylight* daylight, Scene& scene) {
   std::size_t masked = 0;
+  const bool sky_masks = daylight && daylight->has_masks();
   std::vector<std::array<float, 3>> colors;
   for (const BorderSample& border : borders) {
     masked += border.has_mask;
+    scene.masked.push_back(border.has_mask);
     for (std::array<float, 3> color : border.colors) {
       for (float& c : color) c /= static_cast<float>(scene.exposure);
       scene.transform.from_rgb(color.data(), color.data());
@@ -153,12 +162,19 @@ void choose_background(const std::vector<BorderSample>& borders, const Reconstru
                       "a mask for every image");
       background.kind = BackgroundKind::kMask;
       return;
+    case BackgroundChoice::kSky:
+      if (!sky_masks) throw_without_sky(daylight);
+      break;
     case BackgroundChoice::kAuto:
       break;
   }
-  if (!borders.empty() && masked == borders.size()) {
+  if (!borders.empty() && (masked == borders.size() || (sky_masks && masked > 0))) {
     background.kind = BackgroundKind::kMask;
-    scene.notes.push_back("background: mask, because every image has one");
+    scene.notes.push_back(masked == borders.size()
+                              ? "background: mask, because every image has one"
+                              : "background: mask, and unknown for the " +
+                                    std::to_string(borders.size() - masked) + " of " +
+                                    std::to_string(borders.size()) + " images whose sky is not known");
     return;
   }
   choose_automatically(colors, scene);

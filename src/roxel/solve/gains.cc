@@ -81,6 +81,25 @@ std::optional<std::array<double, 3>> fit_view(const LatticeStack& stack,
   return log_gain(photo, rendering, factor, scene.exposure);
 }
 
+bool has_domes(const Light& light) { return light.from == LightSource::kSky; }
+
+/// What is to be taken off the logarithms, so that the gains have one scale: their mean, or, where views have
+/// the light of their dome, the mean of what these are off it.
+std::array<double, 3> common_scale(const std::vector<std::array<double, 3>>& logs,
+                                   const std::vector<char>& fitted, const Light& light) {
+  std::array<double, 3> sum{0, 0, 0};
+  int counted = 0;
+  for (std::size_t v = 0; v < logs.size(); ++v) {
+    const int view = static_cast<int>(v);
+    if (has_domes(light) && (light.is_gain(view) || !fitted[v])) continue;
+    ++counted;
+    for (int c = 0; c < 3; ++c)
+      sum[c] += has_domes(light) ? logs[v][c] - std::log(static_cast<double>(light.of_view(view)[c])) : logs[v][c];
+  }
+  for (double& value : sum) value /= std::max(1, counted);
+  return sum;
+}
+
 }  // namespace
 
 std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Rendering& rendering, int factor,
@@ -121,22 +140,23 @@ GainFit fit_gains(const Volume& volume, const Dataset& dataset, const Photograph
     fitted[view] = gain.has_value();
     for (int c = 0; c < 3; ++c) logs[view][c] = gain ? (*gain)[c] : std::log(static_cast<double>(before[c]));
   });
+  const std::array<double, 3> scale = common_scale(logs, fitted, scene.light);
   GainFit fit;
-  std::array<double, 3> mean{0, 0, 0};
-  for (int v = 0; v < views; ++v) {
-    fit.fitted_views += fitted[v];
-    for (int c = 0; c < 3; ++c) mean[c] += logs[v][c] / views;
-  }
-  fit.of_views.resize(views);
   double squares = 0;
-  for (int v = 0; v < views; ++v)
+  int gains = 0;
+  for (int v = 0; v < views; ++v) {
+    fit.of_views.push_back(scene.light.of_view(v));
+    if (has_domes(scene.light) && (!scene.light.is_gain(v) || !fitted[v])) continue;
+    fit.fitted_views += fitted[v];
+    ++gains;
     for (int c = 0; c < 3; ++c) {
-      const double gain = std::exp(logs[v][c] - mean[c]);
-      squares += (logs[v][c] - mean[c]) * (logs[v][c] - mean[c]);
+      const double log_gain = logs[v][c] - scale[c], gain = std::exp(log_gain);
+      squares += log_gain * log_gain;
       fit.of_views[v][c] = static_cast<float>(gain);
       fit.largest_change = std::max(fit.largest_change, std::abs(gain / scene.light.of_view(v)[c] - 1));
     }
-  if (views > 0) fit.spread = std::sqrt(squares / (3.0 * views));
+  }
+  if (gains > 0) fit.spread = std::sqrt(squares / (3.0 * gains));
   return fit;
 }
 
