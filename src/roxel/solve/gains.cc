@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "roxel/base/parallel.h"
 #include "roxel/march/render.h"
@@ -81,6 +82,24 @@ std::optional<std::array<double, 3>> fit_view(const LatticeStack& stack,
   return log_gain(photo, rendering, factor, scene.exposure);
 }
 
+/// Views under one sky have one gain: of few photographs of one place, each alone shows too little that others
+/// see.
+void share_gains(const Light& light, std::vector<std::array<double, 3>>& logs, std::vector<char>& fitted) {
+  std::map<int, std::vector<int>> views_of_sky;
+  for (std::size_t v = 0; v < light.shared.size(); ++v)
+    if (light.is_gain(static_cast<int>(v)) && light.shared[v] >= 0)
+      views_of_sky[light.shared[v]].push_back(static_cast<int>(v));
+  for (const auto& [sky, views] : views_of_sky) {
+    std::array<std::vector<double>, 3> gains;
+    for (const int v : views)
+      for (int c = 0; c < 3 && fitted[v]; ++c) gains[c].push_back(logs[v][c]);
+    if (gains[0].empty()) continue;
+    std::array<double, 3> shared;
+    for (int c = 0; c < 3; ++c) shared[c] = huber_mean(gains[c]);
+    for (const int v : views) logs[v] = shared, fitted[v] = 1;
+  }
+}
+
 bool has_domes(const Light& light) { return light.from == LightSource::kSky; }
 
 /// What is to be taken off the logarithms, so that the gains have one scale: their mean, or, where views have
@@ -141,6 +160,7 @@ GainFit fit_gains(const Volume& volume, const Dataset& dataset, const Photograph
     for (int c = 0; c < 3; ++c) logs[view][c] = gain ? (*gain)[c] : std::log(static_cast<double>(before[c]));
   });
   const std::array<double, 3> scale = common_scale(logs, fitted, scene.light);
+  if (has_domes(scene.light)) share_gains(scene.light, logs, fitted);
   GainFit fit;
   double squares = 0;
   int gains = 0;

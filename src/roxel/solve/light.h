@@ -26,6 +26,7 @@ struct Light {
   std::vector<std::array<float, 3>> of_views;  ///< one a view; empty: 1 for all
   LightSource from = LightSource::kNone;
   std::vector<std::uint8_t> of_dome;  ///< kSky: one a view, 1 where its light is that of its dome
+  std::vector<int> shared;            ///< kSky: one a view; views of one number >= 0 are in one light
   bool by_normal = false;       ///< kSky: voxels are painted by the light on their own surface
   bool local_matching = false;  ///< colours are compared without their neighbourhood's light
   double blur_deg = 5;          ///< standard deviation of that neighbourhood

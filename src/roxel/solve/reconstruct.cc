@@ -446,6 +446,7 @@ class Levels {
     Scene& scene = made_.scene;
     for (std::size_t v = 0; v < scene.light.of_dome.size(); ++v)
       scene.light.of_dome[v] = daylight_->of_view(static_cast<int>(v)) != nullptr;
+    if (scene.light.from == LightSource::kSky) scene.light.shared = daylight_->sky_of_views;
     for (std::size_t v = 0; v < daylight_->sky_masked.size(); ++v) scene.masked[v] |= daylight_->sky_masked[v];
   }
 

@@ -105,6 +105,7 @@ Image sample_image(const Dataset& dataset, int view_idx, const Photograph& photo
 void say_whose_light(const Daylight& daylight, const std::string& reasons, Scene& scene) {
   for (std::size_t v = 0; v < daylight.sky_of_views.size(); ++v)
     scene.light.of_dome.push_back(daylight.of_view(static_cast<int>(v)) != nullptr);
+  scene.light.shared = daylight.sky_of_views;
   if (!scene.light.has_gains())
     return scene.notes.push_back("light: that of each view's sky is divided out");
   const auto known = std::count(scene.light.of_dome.begin(), scene.light.of_dome.end(), 1);
