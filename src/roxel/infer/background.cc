@@ -24,7 +24,10 @@ float background_likelihood(const Background& background, const MatchModel& mode
     case BackgroundKind::kKnown:
       return known_agreement(background, model, sample) + model.outlier;
     case BackgroundKind::kMask:
-      return view.pyramid->masked() ? (1 - sample.foreground) + model.outlier : background.unknown_likelihood;
+      if (view.pyramid->masked()) return (1 - sample.foreground) + model.outlier;
+      if (background.smooth_share <= 0) return background.unknown_likelihood;
+      return background.unknown_likelihood +
+             background.smooth_share * known_agreement(background, model, sample);
   }
   return 0;
 }

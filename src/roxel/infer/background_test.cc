@@ -75,5 +75,15 @@ TEST(Background, WithoutAMaskOfItsOwnAViewsBackgroundIsAnyColourAlike) {
   EXPECT_EQ(known_background_share(mask, {}, sample_of(20, 1)), 0);
 }
 
+TEST(Background, WithoutAMaskItMayBeSmooth) {
+  Background mask = background_of(BackgroundKind::kMask);
+  mask.smooth_share = 0.25f;
+  const MatchModel model = model_of_noise_4();
+  for (const float l : {20.0f, 35.0f})
+    EXPECT_NEAR(background_likelihood(mask, model, kUnmasked, sample_of(l, 1)),
+                0.002 + 0.25 * known_agreement(l - 20), 1e-6);
+  EXPECT_NEAR(background_likelihood(mask, model, kMasked, sample_of(20, 1)), 1e-7, 1e-9);
+}
+
 }  // namespace
 }  // namespace roxel

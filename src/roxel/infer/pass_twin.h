@@ -54,18 +54,25 @@ inline double twin_agreement(const MatchModel& model, const Eigen::Vector3d& d, 
   return std::sqrt(noise.determinant() / s_12.determinant()) * std::exp(-0.5 * d.dot(s_12.inverse() * d));
 }
 
+inline double twin_background_agreement(const Background& background, const MatchModel& model,
+                                        const RegionStats& sample) {
+  return twin_agreement(model, twin_vector(background.mean) - twin_vector(sample.mean),
+                        twin_matrix(background.cov) + twin_matrix(sample.cov));
+}
+
 inline double twin_known_share(const Background& background, const MatchModel& model,
                                const RegionStats& sample) {
   if (background.kind != BackgroundKind::kKnown) return 0;
-  return twin_agreement(model, twin_vector(background.mean) - twin_vector(sample.mean),
-                        twin_matrix(background.cov) + twin_matrix(sample.cov));
+  return twin_background_agreement(background, model, sample);
 }
 
 inline double twin_background(const Background& background, const MatchModel& model, bool masked,
                               const RegionStats& sample) {
   if (background.kind == BackgroundKind::kNone) return 0;
-  if (background.kind == BackgroundKind::kUnknown || (background.kind == BackgroundKind::kMask && !masked))
-    return background.unknown_likelihood;
+  if (background.kind == BackgroundKind::kUnknown) return background.unknown_likelihood;
+  if (background.kind == BackgroundKind::kMask && !masked)
+    return background.unknown_likelihood +
+           background.smooth_share * twin_background_agreement(background, model, sample);
   if (background.kind == BackgroundKind::kMask) return 1 - sample.foreground + model.outlier;
   return twin_known_share(background, model, sample) + model.outlier;
 }

@@ -1,11 +1,13 @@
 #include "roxel/solve/background_choice.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cmath>
 #include <cstdio>
 
 #include "roxel/base/error.h"
 #include "roxel/color/color_gaussian.h"
+#include "roxel/image/local_light.h"
 
 namespace roxel {
 
@@ -70,6 +72,22 @@ std::array<float, 3> in_matching_space(const std::array<double, 3>& rgb, const S
                              static_cast<float>(rgb[2])};
   scene.transform.from_rgb(color.data(), color.data());
   return color;
+}
+
+/// Of views whose sky is not known, where colours are compared without local light: what is smooth, the sky
+/// above all, then looks like mean grey, with half its tint (docs/light.md).
+void expect_smooth(Scene& scene) {
+  constexpr float kSmoothShare = 0.5f, kBrighter = 0.1f, kTint = 0.25f;
+  std::vector<std::array<float, 3>> colors;
+  for (const float brighter : {-kBrighter, 0.0f, kBrighter})
+    for (const float tint : {-kTint, 0.0f, kTint}) {
+      const float grey = static_cast<float>(LocalLightOptions().mean_level) * std::exp(brighter);
+      std::array<float, 3> color{grey * std::exp(tint), grey, grey * std::exp(-tint)};
+      scene.transform.from_rgb(color.data(), color.data());
+      colors.push_back(color);
+    }
+  fit_constant(colors, colors.front(), 1e9, scene.background);
+  scene.background.smooth_share = kSmoothShare;
 }
 
 void choose_automatically(const std::vector<std::array<float, 3>>& colors, Scene& scene) {
@@ -170,6 +188,7 @@ void choose_background(const std::vector<BorderSample>& borders, const Reconstru
   }
   if (!borders.empty() && (masked == borders.size() || (sky_masks && masked > 0))) {
     background.kind = BackgroundKind::kMask;
+    if (masked < borders.size() && scene.light.local_matching && !std::getenv("NOSMOOTH")) expect_smooth(scene);
     scene.notes.push_back(masked == borders.size()
                               ? "background: mask, because every image has one"
                               : "background: mask, and unknown for the " +

@@ -185,6 +185,7 @@ double opacity_beside_cube(const Dataset& dataset, const PhotographLoader& load,
   options.levels = 1;
   options.passes = 6;
   options.fit_colors = false;
+  options.surround = SurroundChoice::kOff;  // its voxels are not counted
   RunContext context(2);
   ReconstructHooks hooks;
   hooks.daylight = &daylight;

@@ -144,14 +144,22 @@ std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Ren
   return gain;
 }
 
-GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
-                  const Scene& scene, const RunContext& context) {
+namespace {
+
+/// log_gain of every view against the volume; where there is none, the logarithm of its light.
+struct LogGains {
+  std::vector<std::array<double, 3>> logs;
+  std::vector<char> fitted;
+};
+
+LogGains log_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
+                   const Scene& scene, const RunContext& context) {
   const LatticeStack stack(volume);
   const std::vector<std::array<float, 3>> colors = radiance_colors(volume, scene.transform, scene.exposure);
   const int views = static_cast<int>(dataset.views.size());
-  std::vector<std::array<double, 3>> logs(views);
-  std::vector<char> fitted(views, 0);
-  parallel_for(views, context.thread_count(), [&](std::int64_t v, int) {
+  LogGains gains{std::vector<std::array<double, 3>>(views), std::vector<char>(views, 0)};
+  auto& [logs, fitted] = gains;
+  parallel_for(views, context.thread_count(), [&, &logs = logs, &fitted = fitted](std::int64_t v, int) {
     context.throw_if_cancelled();
     const int view = static_cast<int>(v);
     const std::array<float, 3> before = scene.light.of_view(view);
@@ -159,7 +167,17 @@ GainFit fit_gains(const Volume& volume, const Dataset& dataset, const Photograph
     fitted[view] = gain.has_value();
     for (int c = 0; c < 3; ++c) logs[view][c] = gain ? (*gain)[c] : std::log(static_cast<double>(before[c]));
   });
-  const std::array<double, 3> scale = common_scale(logs, fitted, scene.light);
+  return gains;
+}
+
+}  // namespace
+
+GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
+                  const Scene& scene, const RunContext& context, GainScale held_to) {
+  auto [logs, fitted] = log_gains(volume, dataset, load, scene, context);
+  const int views = static_cast<int>(logs.size());
+  const std::array<double, 3> scale = held_to == GainScale::kOfViews ? common_scale(logs, fitted, scene.light)
+                                                                     : std::array<double, 3>{0, 0, 0};
   if (has_domes(scene.light)) share_gains(scene.light, logs, fitted);
   GainFit fit;
   double squares = 0;

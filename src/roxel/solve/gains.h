@@ -17,6 +17,12 @@ struct GainFit {
   double largest_change = 0;  ///< of any view and channel, as a ratio less 1
 };
 
+/// What fixes the gains' common scale.
+enum class GainScale {
+  kOfViews,   ///< all views' gains, or the light of those that have a dome's
+  kOfVolume,  ///< the volume's colours as they are
+};
+
 /// What lies between a photograph and how the volume renders it: per channel the robust (Huber) mean of
 /// log(photograph / rendering), over blocks of factor x factor photographed pixels that the volume covers and
 /// that are neither masked, clipped nor dark; nothing where there are fewer than 32. The rendering has one
@@ -31,6 +37,6 @@ std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Ren
 /// under one sky, though its light is not known, share the robust mean of their gains. `volume` holds canonical
 /// colours. Every image is read once.
 GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
-                  const Scene& scene, const RunContext& context);
+                  const Scene& scene, const RunContext& context, GainScale held_to = GainScale::kOfViews);
 
 }  // namespace roxel

@@ -401,9 +401,12 @@ class Levels {
     const LevelSamples samples(dataset_, load_, options_, context_,
                                std::ldexp(scene.voxel_size, options_.levels - state.level));
     if (state.level == options_.levels) {
-      if (scene.light.by_normal)
+      if (scene.light.by_normal) {
         made_.surface_light = samples.paint_by_normal(scene, *daylight_, made_.volume);
-      else if (scene.light.local_matching)
+        if (scene.light.has_gains())  // of the colours as they now are, without shading
+          scene.light.of_views =
+              fit_gains(made_.volume, dataset_, load_, scene, context_, GainScale::kOfVolume).of_views;
+      } else if (scene.light.local_matching)
         samples.paint(scene, made_.volume);
       if (options_.fit_colors) fit_to_photographs();
     }
