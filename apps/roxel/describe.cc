@@ -48,7 +48,7 @@ Scene preview_scene(const Input& input, const ReconstructOptions& options, RunCo
   with_box.bounds = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
   if (options.illumination == IlluminationChoice::kSky ||
       options.illumination == IlluminationChoice::kSkyNormal)
-    with_box.illumination = IlluminationChoice::kNone;               // skies are fitted when the run begins
+    with_box.illumination = IlluminationChoice::kNone;  // skies are fitted when the run begins
   if (options.background == BackgroundChoice::kSky) with_box.background = BackgroundChoice::kAuto;
   with_box.memory = std::numeric_limits<double>::max() / kGibibyte;  // of all images it is asked below
   const Scene surveyed = survey(few, input.load, with_box, context);

@@ -97,7 +97,7 @@ class PixelDepthMarch {
     shares_.clear();
     RemovedColor removed;
     const Segment whole = march_.march(view, {0, x, y}, sample, ray, view.plan.range, sight, removed, steps_);
-    const float background = 
+    const float background =
         background_likelihood(pass_.opacity.background, pass_.opacity.model, view, sample);
     const float z = whole.likelihood + whole.transmittance * background;
     float transmittance = 1, total = 0, in_world = 0;

@@ -10,7 +10,7 @@ enum class BackgroundKind {
   kNone,     ///< every ray ends in the volume: likelihood 0
   kUnknown,  ///< any colour of the gamut alike: a constant likelihood
   kKnown,    ///< one colour with a spread (black, or a constant one): agreement as for voxels
-  kMask,     ///< the share of the sample that the mask calls background; views without a mask: see smooth_share
+  kMask,  ///< the share of the sample that the mask calls background; views without a mask: see smooth_share
 };
 
 struct Background {

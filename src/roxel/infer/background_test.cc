@@ -55,8 +55,8 @@ TEST(Background, KnownIsAgreementWithItsColour) {
   const Background known = background_of(BackgroundKind::kKnown);
   const MatchModel model = model_of_noise_4();
   for (const float l : {20.0f, 27.0f, 35.0f}) {
-    EXPECT_NEAR(background_likelihood(known, model, kUnmasked, sample_of(l, 1)), known_agreement(l - 20) + 1e-7,
-                1e-6);
+    EXPECT_NEAR(background_likelihood(known, model, kUnmasked, sample_of(l, 1)),
+                known_agreement(l - 20) + 1e-7, 1e-6);
     EXPECT_NEAR(known_background_share(known, model, sample_of(l, 1)), known_agreement(l - 20), 1e-6);
   }
 }
@@ -64,7 +64,8 @@ TEST(Background, KnownIsAgreementWithItsColour) {
 TEST(Background, MaskIsTheShareCalledBackground) {
   const Background mask = background_of(BackgroundKind::kMask);
   for (const float foreground : {0.0f, 0.3f, 1.0f}) {
-    EXPECT_NEAR(background_likelihood(mask, {}, kMasked, sample_of(20, foreground)), 1 - foreground + 1e-7, 1e-7);
+    EXPECT_NEAR(background_likelihood(mask, {}, kMasked, sample_of(20, foreground)), 1 - foreground + 1e-7,
+                1e-7);
     EXPECT_NEAR(known_background_share(mask, {}, sample_of(20, foreground)), 1 - foreground, 1e-7);
   }
 }

@@ -129,7 +129,8 @@ void OpacityPackets::look_behind(const SampleView& view) {
     if (total > 0)
       sample.behind = std::exp(log_sum / total);
     else if (sample.ends)
-      sample.behind = background_likelihood(options_.background, options_.model, view, stats_of(view, sample));
+      sample.behind =
+          background_likelihood(options_.background, options_.model, view, stats_of(view, sample));
     sample.z = sample.own.likelihood + sample.own.transmittance * sample.behind;
   }
 }

@@ -199,8 +199,8 @@ class PassTwin {
         best = std::max(best, child.path_sum);
         node.children.push_back(std::move(child));
       }
-    node.background_likelihood = twin_background(options_.opacity.background, options_.opacity.model,
-                                                  view.pyramid->masked(), stats);
+    node.background_likelihood =
+        twin_background(options_.opacity.background, options_.opacity.model, view.pyramid->masked(), stats);
     node.path_sum += node.children.empty() ? node.background_likelihood : best;
     node.z =
         node.likelihood + node.transmittance * (node.children.empty() ? node.background_likelihood

@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kSameSky_s = 900;
 constexpr double kSamePlace_deg = 0.01;  ///< a kilometre: what coordinates of one place may differ by
-constexpr double kApart = 10;  ///< two groups of cameras this many times as far apart as either is wide are two
+constexpr double kApart =
+    10;  ///< two groups of cameras this many times as far apart as either is wide are two
 
 /// The direction that cameras hold upright: cameras tilt, but they seldom roll, so it is the one that their
 /// rows of pixels are most at right angles to.
@@ -177,7 +178,8 @@ void check_one_centre(const Dataset& dataset, const Node& node, std::vector<std:
   if (spacing > 0 && halves.gap > spacing)
     throw_invalid(where, found + formatted("; nodes are %.4g apart", spacing),
                   "one place a node (two nodes of the same name?)");
-  warnings.push_back(where + ": " + found + ": they are taken to be under one sky (two nodes of the same name?)");
+  warnings.push_back(where + ": " + found +
+                     ": they are taken to be under one sky (two nodes of the same name?)");
 }
 
 /// Views of one place, apart by time; without times all together.

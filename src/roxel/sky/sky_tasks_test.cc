@@ -84,7 +84,8 @@ TEST(SkyTasks, OneNodeInTwoCitiesIsAnErrorThatNamesTheFrames) {
   };
   EXPECT_EQ(tasks(42.365, -71.095).tasks.size(), 1u);
   for (const auto& [latitude, longitude, what] :
-       {std::tuple{-33.0, -71.09, "a latitude of -33, while frames of a"}, {42.36, 151.0, "a longitude of 151"}})
+       {std::tuple{-33.0, -71.09, "a latitude of -33, while frames of a"},
+        {42.36, 151.0, "a longitude of 151"}})
     try {
       tasks(latitude, longitude);
       FAIL();
@@ -103,7 +104,8 @@ TEST(SkyTasks, OneNodeInTwoCitiesIsAnErrorThatNamesTheFrames) {
 Dataset three_nodes_and(double distance) {
   std::vector<View> views;
   for (int n = 1; n <= 3; ++n)
-    for (const char* name : {"a", "b"}) views.push_back(view(name + std::to_string(n), {10.0 * (n - 1), 0, 0}, {}, n));
+    for (const char* name : {"a", "b"})
+      views.push_back(view(name + std::to_string(n), {10.0 * (n - 1), 0, 0}, {}, n));
   views.push_back(view("x", {0, distance, 0}, {}, 1));
   return dataset(views);
 }

@@ -1,7 +1,6 @@
 #include "roxel/solve/background_choice.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <cmath>
 #include <cstdio>
 
@@ -188,7 +187,7 @@ void choose_background(const std::vector<BorderSample>& borders, const Reconstru
   }
   if (!borders.empty() && (masked == borders.size() || (sky_masks && masked > 0))) {
     background.kind = BackgroundKind::kMask;
-    if (masked < borders.size() && scene.light.local_matching && !std::getenv("NOSMOOTH")) expect_smooth(scene);
+    if (masked < borders.size() && scene.light.local_matching) expect_smooth(scene);
     scene.notes.push_back(masked == borders.size()
                               ? "background: mask, because every image has one"
                               : "background: mask, and unknown for the " +

@@ -94,7 +94,8 @@ TEST(BackgroundChoice, MasksOfTheSkyCountWhereThereAreSomeAndTheOthersAreOpen) {
       chosen(photos, with(BackgroundChoice::kSky), missing);
       FAIL() << "no error";
     } catch (const InvalidInput& error) {
-      EXPECT_THAT(error.what(), HasSubstr(missing ? "is known: 2 night (n07)" : "no photograph whose sky is known"));
+      EXPECT_THAT(error.what(),
+                  HasSubstr(missing ? "is known: 2 night (n07)" : "no photograph whose sky is known"));
     }
 }
 

@@ -20,8 +20,8 @@ enum class DomeLight {
 struct Daylight {
   std::vector<NodeSky> skies;
   std::vector<int> sky_of_views;         ///< one a view; -1 where none is known
-  std::vector<std::uint8_t> sky_masked;  ///< one a view, 1: it comes with a mask that calls the sky background;
-                                         ///< empty: none does
+  std::vector<std::uint8_t> sky_masked;  ///< one a view, 1: it comes with a mask that calls the sky
+                                         ///< background; empty: none does
 
   /// Of a view; null where its light is not known as a whole.
   const NodeSky* of_view(int view_idx) const;

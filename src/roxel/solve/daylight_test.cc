@@ -15,7 +15,8 @@
 namespace roxel {
 namespace {
 
-/// A dome of one colour all over, whose sun is known not to shine: a white horizontal surface below it has that colour.
+/// A dome of one colour all over, whose sun is known not to shine: a white horizontal surface below it has
+/// that colour.
 NodeSky uniform_sky(double r, double g, double b) {
   NodeSky sky;
   sky.model = SkyModel::kUniform;
@@ -220,7 +221,8 @@ TEST(NodesWithoutASky, DoNotBuildTheirSky) {
   const auto loader = [&](bool night_has_masks) {
     return [&, night_has_masks](const View& view) {
       const bool night = !daylight.sky_masked[&view - dataset.views.data()];
-      Photograph photo = fixture::CubeWorld::photograph(view.camera, std::array<float, 3>{0.3f, 0.4f, 0.6f}, true);
+      Photograph photo =
+          fixture::CubeWorld::photograph(view.camera, std::array<float, 3>{0.3f, 0.4f, 0.6f}, true);
       if (night)
         for (float& value : photo.rgb.data()) value *= 0.3f;
       if (night) photo.foreground = night_has_masks ? Mask(32, 32) : Mask();

@@ -82,8 +82,8 @@ std::optional<std::array<double, 3>> fit_view(const LatticeStack& stack,
   return log_gain(photo, rendering, factor, scene.exposure);
 }
 
-/// Views under one sky have one gain: of few photographs of one place, each alone shows too little that others
-/// see.
+/// Views under one sky have one gain: of few photographs of one place, each alone shows too little that
+/// others see.
 void share_gains(const Light& light, std::vector<std::array<double, 3>>& logs, std::vector<char>& fitted) {
   std::map<int, std::vector<int>> views_of_sky;
   for (std::size_t v = 0; v < light.shared.size(); ++v)
@@ -113,7 +113,8 @@ std::array<double, 3> common_scale(const std::vector<std::array<double, 3>>& log
     if (has_domes(light) && (light.is_gain(view) || !fitted[v])) continue;
     ++counted;
     for (int c = 0; c < 3; ++c)
-      sum[c] += has_domes(light) ? logs[v][c] - std::log(static_cast<double>(light.of_view(view)[c])) : logs[v][c];
+      sum[c] +=
+          has_domes(light) ? logs[v][c] - std::log(static_cast<double>(light.of_view(view)[c])) : logs[v][c];
   }
   for (double& value : sum) value /= std::max(1, counted);
   return sum;

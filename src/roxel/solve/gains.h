@@ -31,11 +31,11 @@ std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Ren
                                               double exposure);
 
 /// Gains that bring the volume's colours nearest to the photographs, by log_gain at about 96 pixels along
-/// the longer side. Their geometric mean over the views is 1 in every channel; where some views have the light
-/// of their dome, these keep it, and the others' gains are held to its scale: what lies between log_gain and
-/// that light, in the mean over the views that have it, is taken off; and views
-/// under one sky, though its light is not known, share the robust mean of their gains. `volume` holds canonical
-/// colours. Every image is read once.
+/// the longer side. Their geometric mean over the views is 1 in every channel; where some views have the
+/// light of their dome, these keep it, and the others' gains are held to its scale: what lies between
+/// log_gain and that light, in the mean over the views that have it, is taken off; and views under one sky,
+/// though its light is not known, share the robust mean of their gains. `volume` holds canonical colours.
+/// Every image is read once.
 GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
                   const Scene& scene, const RunContext& context, GainScale held_to = GainScale::kOfViews);
 

@@ -27,16 +27,17 @@ struct Light {
   LightSource from = LightSource::kNone;
   std::vector<std::uint8_t> of_dome;  ///< kSky: one a view, 1 where its light is that of its dome
   std::vector<int> shared;            ///< kSky: one a view; views of one number >= 0 are in one light
-  bool by_normal = false;       ///< kSky: voxels are painted by the light on their own surface
-  bool local_matching = false;  ///< colours are compared without their neighbourhood's light
-  double blur_deg = 5;          ///< standard deviation of that neighbourhood
+  bool by_normal = false;             ///< kSky: voxels are painted by the light on their own surface
+  bool local_matching = false;        ///< colours are compared without their neighbourhood's light
+  double blur_deg = 5;                ///< standard deviation of that neighbourhood
 
   std::array<float, 3> of_view(int view_idx) const {
     return of_views.empty() ? std::array<float, 3>{1, 1, 1} : of_views[view_idx];
   }
   /// Whether a view's light is a gain, which follows the volume from pass to pass.
   bool is_gain(int view_idx) const {
-    return from == LightSource::kGain || (from == LightSource::kSky && !of_dome.empty() && !of_dome[view_idx]);
+    return from == LightSource::kGain ||
+           (from == LightSource::kSky && !of_dome.empty() && !of_dome[view_idx]);
   }
   bool has_gains() const {
     return from == LightSource::kGain ||

@@ -224,7 +224,8 @@ void add_background(OptionTable<Options>& table) {
             {"mask", BackgroundChoice::kMask},
             {"sky", BackgroundChoice::kSky}})
       .help(
-          "What a ray sees that passes every voxel; sky: what the masks of skies say, those of --sky or fitted "
+          "What a ray sees that passes every voxel; sky: what the masks of skies say, those of --sky or "
+          "fitted "
           "in this run, and anything in photographs whose sky is not known")
       .source("docs/background.md");
   table.add("background-color", &Options::background_color)

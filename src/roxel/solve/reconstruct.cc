@@ -115,8 +115,8 @@ RefineOptions refine_options(const ReconstructOptions& options) {
 /// Before a background that may have any colour, and before a camera inside the box, whatever rises first
 /// hides what is behind it: there, only falling opacities are hurried.
 Accelerate which_steps(const Scene& scene) {
-  const bool open = (scene.has_open_ends() && scene.background.kind != BackgroundKind::kNone) ||
-                    scene.seen_from_inside;
+  const bool open =
+      (scene.has_open_ends() && scene.background.kind != BackgroundKind::kNone) || scene.seen_from_inside;
   return open ? Accelerate::kFalling : Accelerate::kBoth;
 }
 
@@ -450,7 +450,8 @@ class Levels {
     for (std::size_t v = 0; v < scene.light.of_dome.size(); ++v)
       scene.light.of_dome[v] = daylight_->of_view(static_cast<int>(v)) != nullptr;
     if (scene.light.from == LightSource::kSky) scene.light.shared = daylight_->sky_of_views;
-    for (std::size_t v = 0; v < daylight_->sky_masked.size(); ++v) scene.masked[v] |= daylight_->sky_masked[v];
+    for (std::size_t v = 0; v < daylight_->sky_masked.size(); ++v)
+      scene.masked[v] |= daylight_->sky_masked[v];
   }
 
   void make_topology(int level, const std::vector<SampleNode>& samples) {

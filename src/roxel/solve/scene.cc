@@ -106,8 +106,7 @@ void say_whose_light(const Daylight& daylight, const std::string& reasons, Scene
   for (std::size_t v = 0; v < daylight.sky_of_views.size(); ++v)
     scene.light.of_dome.push_back(daylight.of_view(static_cast<int>(v)) != nullptr);
   scene.light.shared = daylight.sky_of_views;
-  if (!scene.light.has_gains())
-    return scene.notes.push_back("light: that of each view's sky is divided out");
+  if (!scene.light.has_gains()) return scene.notes.push_back("light: that of each view's sky is divided out");
   const auto known = std::count(scene.light.of_dome.begin(), scene.light.of_dome.end(), 1);
   scene.warnings.push_back("light: that of the sky is divided out of " + std::to_string(known) + " of " +
                            std::to_string(scene.light.of_dome.size()) +
@@ -168,7 +167,8 @@ double footprint_px(const PinholeCamera& camera, const Scene& scene, double voxe
 
 bool Scene::has_open_ends() const {
   return background.kind == BackgroundKind::kUnknown || background.kind == BackgroundKind::kNone ||
-         (background.kind == BackgroundKind::kMask && std::find(masked.begin(), masked.end(), 0) != masked.end());
+         (background.kind == BackgroundKind::kMask &&
+          std::find(masked.begin(), masked.end(), 0) != masked.end());
 }
 
 Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options) {
