@@ -84,7 +84,7 @@ void march(FinishedRun& run, Input input, const DepthOptions& wanted, const fs::
   std::optional<Daylight> daylight;
   if (const fs::path skies = skies_of(run); !skies.empty()) {
     daylight = read_daylight(skies, input.dataset);
-    if (daylight->masks) input.load = with_sky_masks(input.load, skies);
+    if (daylight->has_masks()) input.load = with_sky_masks(input.load, skies);
   }
   made.scene = survey(input.dataset, input.load, options, context, daylight ? &*daylight : nullptr);
   made.scene.light = light_of_run(run, input.dataset);

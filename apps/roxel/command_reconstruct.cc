@@ -104,7 +104,7 @@ class Run {
     session_.context().throw_if_cancelled();
     protect_sources(invocation_.output, sources());
     const OutputFolder folder(invocation_.output);
-    for (const std::string& warning : input_.dataset.warnings) warn(options_.common, warning);
+    warn_of_dataset();
     if (options_.reconstruct.memory)
       require_memory(input_.dataset, lay_out(input_.dataset, input_.load, options_.reconstruct),
                      options_.reconstruct, session_.context().thread_count());
@@ -119,6 +119,7 @@ class Run {
     if (resume) seconds_before_ = resume->summary.seconds;
     try {
       if (skies_.find(results)) add_stage("sky");
+      warn_of_dataset();
       make_volume(initial ? &initial->volume : nullptr, resume, checkpoints);
       if (initial && initial->info.exposure != made_.scene.exposure)
         warn(options_.common,
@@ -140,6 +141,12 @@ class Run {
     if (options_.stages.init) read.folders.push_back(*options_.stages.init);
     if (options_.stages.sky) read.folders.push_back(*options_.stages.sky);
     return read;
+  }
+
+  /// Says what has been added to the data set's warnings since the last call.
+  void warn_of_dataset() {
+    const std::vector<std::string>& all = input_.dataset.warnings;
+    for (; warned_ < all.size(); ++warned_) warn(options_.common, all[warned_]);
   }
 
   int describe_only() {
@@ -410,6 +417,7 @@ class Run {
   const RunOptions& options_;
   Session session_;
   Input input_;
+  std::size_t warned_ = 0;  ///< of the data set's warnings
   std::vector<std::string> hashes_;
   Stopwatch stopwatch_;
   std::optional<PartialResults> partial_;

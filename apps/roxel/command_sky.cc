@@ -159,12 +159,17 @@ ReportView write_pictures(const fs::path& run, const SkyFit& fit) {
   return sky_report(fit, panels);
 }
 
-/// A mask by hand stands; the others come from the fit.
+/// Whether a fit says anything of where the sky is.
+bool tells_sky(const NodeSky& sky) { return sky.has_light() || sky.fallback == kClippedSky; }
+
+/// A mask by hand stands; the others come from the fit, and are empty where it says nothing.
 std::vector<Mask> make_masks(const SkyFit& fit, const SkyPictureSource& pictures) {
   std::vector<Mask> masks;
   for (std::size_t i = 0; i < fit.sky.views.size(); ++i) {
     SkyPicture picture = pictures(static_cast<int>(i));
-    masks.push_back(picture.known_sky.empty() ? soft_sky_mask(picture, fit) : std::move(picture.known_sky));
+    masks.push_back(!picture.known_sky.empty() ? std::move(picture.known_sky)
+                    : tells_sky(fit.sky)       ? soft_sky_mask(picture, fit)
+                                               : Mask());
   }
   return masks;
 }
@@ -181,7 +186,7 @@ double mean_share(const std::vector<Mask>& masks) {
 
 void write_masks(const fs::path& run, const SkyFit& fit, const std::vector<Mask>& masks) {
   for (std::size_t i = 0; i < masks.size(); ++i)
-    write_png(sky_mask_path(run, fit.sky.views[i]).string(), masks[i]);
+    if (!masks[i].empty()) write_png(sky_mask_path(run, fit.sky.views[i]).string(), masks[i]);
 }
 
 NodeReport do_node(const SkyTask& task, const SkyPictureSource& pictures, const SkyCommandOptions& options,
@@ -218,6 +223,9 @@ ordered_json summary_json(const Invocation& invocation, const SkyInput& input, c
                           const std::vector<NodeReport>& reports, double seconds) {
   std::size_t images = 0;
   ordered_json skies = ordered_json::array(), warnings = ordered_json::array();
+  if (input.input)
+    for (const std::string& warning : input.input->dataset.warnings) warnings.push_back(warning);
+  for (const std::string& warning : input.warnings) warnings.push_back(warning);
   for (const SkyTask& task : input.tasks) images += task.views.size();
   for (const NodeReport& report : reports) {
     skies.push_back(report.json);

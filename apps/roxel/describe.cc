@@ -22,6 +22,7 @@ constexpr double kGibibyte = 1024.0 * 1024.0 * 1024.0;
 
 /// With the light that may be found once the run begins, where its options leave that to the photographs.
 Scene with_light(const ReconstructOptions& options, Scene scene) {
+  if (options.background == BackgroundChoice::kSky) scene.background.kind = BackgroundKind::kMask;
   if (options.illumination == IlluminationChoice::kNone || options.illumination == IlluminationChoice::kGain)
     return scene;
   scene.light.from = LightSource::kSky;
@@ -47,7 +48,8 @@ Scene preview_scene(const Input& input, const ReconstructOptions& options, RunCo
   with_box.bounds = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
   if (options.illumination == IlluminationChoice::kSky ||
       options.illumination == IlluminationChoice::kSkyNormal)
-    with_box.illumination = IlluminationChoice::kNone;               // skies are fitted when the run begins
+    with_box.illumination = IlluminationChoice::kNone;  // skies are fitted when the run begins
+  if (options.background == BackgroundChoice::kSky) with_box.background = BackgroundChoice::kAuto;
   with_box.memory = std::numeric_limits<double>::max() / kGibibyte;  // of all images it is asked below
   const Scene surveyed = survey(few, input.load, with_box, context);
   scene.background = surveyed.background;

@@ -27,15 +27,18 @@ RunSkies::RunSkies(const Invocation& invocation, const RunOptions& options, Sess
 bool RunSkies::find(const std::filesystem::path& results) {
   results_ = results;
   const IlluminationChoice choice = options_.reconstruct.illumination;
-  const bool wanted = choice == IlluminationChoice::kSky || choice == IlluminationChoice::kSkyNormal;
+  const bool wanted = choice == IlluminationChoice::kSky || choice == IlluminationChoice::kSkyNormal ||
+                      options_.reconstruct.background == BackgroundChoice::kSky;
   const bool likely = choice == IlluminationChoice::kAuto && several_times_of_day(input_.dataset);
   const bool fitted = !options_.stages.sky && (wanted || likely);
   check_sky_options(fitted);
-  if (fitted && !find_skies(wanted)) return true;
+  const bool found = fitted && find_skies(wanted);
+  warn_if_idle(found);
+  if (fitted && !found) return true;
   if (!fitted && !options_.stages.sky) return false;
   const std::filesystem::path skies = fitted ? results_ : std::filesystem::path(*options_.stages.sky);
   daylight_ = read_daylight(skies, input_.dataset);
-  if (daylight_->masks) input_.load = with_sky_masks(input_.load, skies);
+  if (daylight_->has_masks()) input_.load = with_sky_masks(input_.load, skies);
   if (fitted && options_.stages.sky_again && options_.reconstruct.levels > 1) {
     doubt_ = std::make_shared<std::atomic<bool>>(true);
     input_.load = with_doubt(input_.load, up(), doubt_);
@@ -48,7 +51,16 @@ void RunSkies::check_sky_options(bool fitted) const {
   const char* idle = options_.stages.sun ? "--sun" : options_.stages.sky_masks ? "--sky-masks" : nullptr;
   if (idle)
     throw_invalid(idle, "no sky that is fitted in this run",
-                  "--illumination sky or sky-normal, without --sky RUN");
+                  "--illumination sky or sky-normal, or --background sky, without --sky RUN");
+}
+
+void RunSkies::warn_if_idle(bool fitted) {
+  if (!options_.stages.sky_again) return;
+  const char* why = options_.stages.sky                ? "skies are taken from --sky RUN as they are"
+                    : !fitted                          ? "no skies are fitted in this run; see --illumination"
+                    : options_.reconstruct.levels == 1 ? "there is but one level; see --levels"
+                                                       : nullptr;
+  if (why) input_.dataset.warnings.push_back(std::string("--sky-again has no effect here: ") + why);
 }
 
 SkyOptions RunSkies::sky_options() const {
@@ -61,20 +73,22 @@ SkyOptions RunSkies::sky_options() const {
 
 bool RunSkies::find_skies(bool wanted) {
   sky_input_ = read_sky_input(invocation_.inputs.front(), options_.input, sky_options(), session_);
+  for (const std::string& warning : sky_input_->warnings) input_.dataset.warnings.push_back(warning);
   skies_ = fit_skies(*sky_input_, sky_options(), results_, session_, input_.dataset.warnings);
+  if (wanted) return true;
+  const Daylight daylight = read_daylight(results_, input_.dataset);
+  const std::size_t views = input_.dataset.views.size();
   std::size_t lit = 0;
-  for (const auto& node : skies_)
-    if (node.value("model", "none") != "none") lit += node.value("images", std::size_t{0});
-  const bool found = wanted || 2 * lit >= input_.dataset.views.size();
-  if (!wanted)
-    input_.dataset.notes.push_back("light: photographs of several times of day, of which " +
-                                   std::to_string(lit) + " of " +
-                                   std::to_string(input_.dataset.views.size()) +
-                                   (found ? " have a sky" : " have a sky: too few to divide it out"));
-  if (found) return true;
-  skies_.clear();
-  std::filesystem::remove_all(results_ / "sky");
-  return false;
+  for (std::size_t v = 0; v < views; ++v) lit += daylight.of_view(static_cast<int>(v)) != nullptr;
+  const bool found = 2 * lit >= views;
+  const std::string reasons = reasons_without_light(daylight);
+  std::string note = "light: photographs of several times of day; of " + std::to_string(lit) + " of " +
+                     std::to_string(views) + " the light of the sky is known";
+  if (!found) note += ", too few to divide it out";
+  if (!reasons.empty()) note += ": " + reasons;
+  (found ? input_.dataset.notes : input_.dataset.warnings).push_back(note);
+  if (!found) std::filesystem::remove_all(results_ / "sky");
+  return found;
 }
 
 Eigen::Vector3d RunSkies::up() const {

@@ -27,8 +27,11 @@ class RunSkies {
  private:
   /// What says how skies are fitted does nothing where none is.
   void check_sky_options(bool fitted) const;
+  /// Says so where --sky-again does nothing.
+  void warn_if_idle(bool fitted);
   SkyOptions sky_options() const;
-  /// Fits the skies. Where they were not asked for, half of the photographs must turn out to have one.
+  /// Fits the skies. Where they were not asked for, the light of half of the photographs must turn out to be
+  /// known; else nodes() says why not, and nothing is left of them below `results`.
   bool find_skies(bool wanted);
   Eigen::Vector3d up() const;
   /// Skies again, with what a first volume leaves unexplained. From here on masks are not doubted.

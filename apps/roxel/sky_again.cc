@@ -43,8 +43,7 @@ PhotographLoader with_doubt(PhotographLoader load, const Eigen::Vector3d& up,
                             std::shared_ptr<const std::atomic<bool>> doubt) {
   return [load = std::move(load), up, doubt = std::move(doubt)](const View& view) {
     Photograph photo = load(view);
-    if (!*doubt) return photo;
-    if (photo.foreground.empty()) photo.foreground = Mask(photo.rgb.width(), photo.rgb.height());
+    if (!*doubt || photo.foreground.empty()) return photo;
     for (int y = 0; y < photo.rgb.height(); ++y)
       for (int x = 0; x < photo.rgb.width(); ++x)
         if (photo.foreground.at(x, y) > kDoubt && rises(view.camera, up, x, y))

@@ -19,7 +19,8 @@ OpenRays open_rays(const Volume& volume, const Dataset& dataset, const Scene& sc
                    const Eigen::Vector3d& up, const RunContext& context);
 
 /// The loader, with what rises above the horizon as possibly, if hardly, background while `doubt` holds: a
-/// mask that lacks part of the sky must not force a volume to be built there.
+/// mask that lacks part of the sky must not force a volume to be built there. Photographs without a mask stay
+/// as they are.
 PhotographLoader with_doubt(PhotographLoader load, const Eigen::Vector3d& up,
                             std::shared_ptr<const std::atomic<bool>> doubt);
 

@@ -87,6 +87,7 @@ SkyInput read_views(const std::string& path, const InputOptions& input, const Sk
   DatasetSkies skies = sky_tasks(dataset, options.up);
   sky.tasks = std::move(skies.tasks);
   sky.notes = std::move(skies.notes);
+  sky.warnings = std::move(skies.warnings);
   for (std::size_t t = 0; t < sky.tasks.size(); ++t) {
     std::vector<View> views;
     for (const int v : skies.view_idxs[t]) views.push_back(dataset.views[v]);

@@ -15,8 +15,8 @@ struct SkyInput {
   std::optional<Input> input;  ///< none for a panorama
   std::string path, format;
   std::vector<SkyTask> tasks;
-  std::vector<SkyPictureSource> pictures;  ///< of each task
-  std::vector<std::string> notes;
+  std::vector<SkyPictureSource> pictures;    ///< of each task
+  std::vector<std::string> notes, warnings;  ///< of what shares a sky; not the reader's own
 };
 
 /// Throws InvalidInput, also for masks by hand that no image has.

@@ -20,7 +20,7 @@ Daylight read_daylight(const fs::path& run, const Dataset& dataset) {
   for (const View& view : dataset.views) {
     const auto found = sky_of_name.find(view.name);
     daylight.sky_of_views.push_back(found == sky_of_name.end() ? -1 : found->second);
-    daylight.masks |= fs::is_regular_file(sky_mask_path(run, view.name));
+    daylight.sky_masked.push_back(fs::is_regular_file(sky_mask_path(run, view.name)));
   }
   if (std::all_of(daylight.sky_of_views.begin(), daylight.sky_of_views.end(), [](int s) { return s < 0; }))
     throw_invalid(run.string(), "skies of other photographs",

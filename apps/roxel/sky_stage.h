@@ -17,8 +17,9 @@ std::vector<nlohmann::ordered_json> fit_skies(const SkyInput& input, const SkyOp
 /// the run has none, or none for any view.
 Daylight read_daylight(const std::filesystem::path& run, const Dataset& dataset);
 
-/// The loader, with what RUN/sky/mask calls sky as background besides what a mask of its own does. Throws
-/// InvalidInput for a mask of another size than its image.
+/// The loader, with what RUN/sky/mask calls sky as background besides what a mask of its own does; views
+/// whose sky is not known have no mask there, and stay as they are. Throws InvalidInput for a mask of another
+/// size than its image.
 PhotographLoader with_sky_masks(PhotographLoader load, const std::filesystem::path& run);
 
 }  // namespace roxel::cli

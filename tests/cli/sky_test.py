@@ -7,8 +7,10 @@
 import json
 import math
 import os
+import struct
 import sys
 import unittest
+import zlib
 
 import program
 from program import digest, files_below, start_until
@@ -209,6 +211,20 @@ class SkyInput(SkyCase):
 
         _, summary = self.sky("night", data=self.frames("night", night))
         self.assertEqual([(s["model"], s["fallback"], s["images"]) for s in summary["skies"]], [("none", "night", 4)])
+        self.assertFalse([f for f in files_below(self.folder / "night") if f.startswith("sky/mask")])  # unknown, not "no sky"
+
+    def test_what_the_reader_warns_of_is_said(self):
+        def two_places(frames):  # of one node, nearer to each other than to the others
+            for frame in frames[:2]: frame.update(node=1)
+            for i in range(3):
+                here, there = frames[0]["transform_matrix"][i], frames[1]["transform_matrix"][i]
+                there[3] = 0.7 * here[3] + 0.3 * there[3]
+
+        data = self.frames("two-places", two_places)
+        done = self.succeed("sky", data, "-o", self.folder / "warned", "--no-pictures", "--facets", "4")
+        warnings = json.loads((self.folder / "warned/summary.json").read_text())["warnings"]
+        self.assertTrue(any("frames[1]: node 1: a camera " in w and "frames[0]" in w for w in warnings), warnings)
+        for warning in warnings: self.assertIn(warning, done.stderr)
 
 
 class SkyMeasures(SkyCase):
@@ -239,6 +255,81 @@ def main():
 SMALL = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--no-depth", "--no-report", "--quiet"]
 
 
+def unpack_runs(data):
+    """Of the EXR files' run-length compression."""
+    out, at = bytearray(), 0
+    while at < len(data):
+        count = data[at]
+        if count > 127: out += data[at + 1:at + 257 - count]
+        else: out += data[at + 1:at + 2] * (count + 1)
+        at += 257 - count if count > 127 else 2
+    return out
+
+
+def read_exr(path):
+    """Channels by name, each a list of rows; of the scanlines that roxel writes."""
+    data = path.read_bytes()
+    at, header = 8, {}
+    while data[at]:
+        name, kind = data[at:].split(b"\0", 2)[:2]
+        at += len(name) + len(kind) + 2
+        size, = struct.unpack_from("<i", data, at)
+        header[name.decode()] = data[at + 4:at + 4 + size]
+        at += 4 + size
+    at += 1
+    x0, y0, x1, y1 = struct.unpack("<4i", header["dataWindow"])
+    width, height = x1 - x0 + 1, y1 - y0 + 1
+    channels, rest = [], header["channels"]
+    while rest[0]:
+        name, rest = rest.split(b"\0", 1)
+        channels.append((name.decode(), "e" if rest[0] == 1 else "f"))
+        rest = rest[16:]
+    lines = 16 if header["compression"][0] == 3 else 1
+    rows = {name: [] for name, _ in channels}
+    for offset in struct.unpack_from("<%dQ" % -(-height // lines), data, at):
+        y, size = struct.unpack_from("<ii", data, offset)
+        block, count = data[offset + 8:offset + 8 + size], min(lines, height - (y - y0))
+        if header["compression"][0] and size < count * width * sum(2 if kind == "e" else 4 for _, kind in channels):
+            packed = unpack_runs(block) if header["compression"][0] == 1 else bytearray(zlib.decompress(block))
+            for i in range(1, len(packed)): packed[i] = (packed[i - 1] + packed[i] - 128) & 255
+            block, half = bytearray(len(packed)), (len(packed) + 1) // 2
+            block[0::2], block[1::2] = packed[:half], packed[half:]
+        at_row = 0
+        for _ in range(count):
+            for name, kind in channels:
+                rows[name].append(struct.unpack_from("<%d%s" % (width, kind), block, at_row))
+                at_row += width * struct.calcsize(kind)
+    return rows
+
+
+def clouded_street(street, folder, node=0, towards=(300, 50), radius_deg=22, color=(0.35, 0.36, 0.38)):
+    """The street under one white cloud over one node; and the cloud's pixels (x, y) by view."""
+    folder.mkdir()
+    azimuth, elevation = map(math.radians, towards)
+    middle = (math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation))
+    data, cloud = json.loads((street / "transforms.json").read_text()), {}
+    for frame in data["frames"]:
+        image = street / frame["file_path"]
+        depth = read_exr(street / frame["depth_path"])
+        for key in ("mask_path", "depth_path", "albedo_path", "normal_path", "sky_path"): frame.pop(key)
+        frame["file_path"] = str(image)
+        if frame["node"] != node: continue
+        picture, pixels, (depth,) = read_exr(image), [], depth.values()
+        for y, row in enumerate(picture["R"]):
+            for x in range(len(row)):
+                in_camera = ((x + 0.5 - data["cx"]) / data["fl_x"], (data["cy"] - y - 0.5) / data["fl_y"], -1)
+                ray = [sum(m * c for m, c in zip(line, in_camera)) for line in frame["transform_matrix"][:3]]
+                cosine = sum(a * b for a, b in zip(ray, middle)) / math.hypot(*ray)
+                in_cloud = not 0 < depth[y][x] < 1e6 and cosine > math.cos(math.radians(radius_deg))
+                if in_cloud: cloud.setdefault(image.stem, []).append((x, y))
+                pixels.append(rgbe(color if in_cloud else [picture[c][y][x] for c in "RGB"]))
+        file = folder / f"{image.stem}.hdr"
+        file.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (len(picture["R"]), len(picture["R"][0])) + b"".join(pixels))
+        frame["file_path"] = file.name
+    (folder / "transforms.json").write_text(json.dumps(data))
+    return folder, cloud
+
+
 def set_up_street(cls):
     super(cls, cls).setUpClass()
     cls.street, cls.skies = cls.folder / "street", cls.folder / "street-skies"
@@ -256,7 +347,7 @@ def reconstruct_street(self, name, *arguments):
 
 def lights_of_nodes(self, summary):
     by_node = {}
-    for view in summary["views"]: by_node.setdefault(view["name"][:3], set()).add(tuple(view["light"]))
+    for view in summary["views"]: by_node.setdefault(view["name"].split("/")[-1][:3], set()).add(tuple(view["light"]))
     return by_node
 
 
@@ -289,6 +380,15 @@ class SkyInReconstruct(SkyCase):
         self.assertEqual(self.lights(fitted), self.lights(refitted))
         self.reconstruct("fitted", "--illumination", "none")  # a run that is replaced takes its skies with it
         self.assertNotIn("sky/n00.json", files_below(out))
+
+    def test_skies_may_be_background_alone(self):
+        plain, none = self.reconstruct("no-sky", "--illumination", "none")
+        fitted, sky = self.reconstruct("background", "--illumination", "none", "--background", "sky")
+        given, same = self.reconstruct("background-given", "--illumination", "none", "--background", "sky", "--sky", self.skies)
+        self.assertEqual((none["scene"]["background"]["kind"], sky["scene"]["background"]["kind"]), ("unknown", "mask"))
+        self.assertEqual(sky["scene"]["light"]["illumination"], "none")
+        self.assertNotEqual(digest(plain / "voxels.ply"), digest(fitted / "voxels.ply"))
+        self.assertEqual(digest(given / "voxels.ply"), digest(fitted / "voxels.ply"))
 
     def test_skies_of_other_photographs_are_refused(self):
         skies, _ = self.sky("square")
@@ -328,9 +428,35 @@ class LightInReconstruct(SkyCase):
         self.assertEqual([node["node"] for node in looked["skies_again"]], [node["node"] for node in looked["skies"]])
         for node in looked["skies_again"]:
             self.assertGreater(node["unexplained_share"], 0)
-            if not node["taken"]: self.assertLess(node["mask_share"], node["mask_share_before"] + 0.01)
+            self.assertEqual(node["taken"], node["mask_share"] > node["mask_share_before"] + 0.002)
         _, once = self.reconstruct("once", *two)
         self.assertNotIn("skies_again", once)
+
+    def test_a_cloud_that_the_first_fit_lacks_is_sky_after_the_second(self):
+        data, cloud = clouded_street(self.street, self.folder / "clouded")
+        self.assertGreater(sum(map(len, cloud.values())), 1000)
+        found = {}
+        for name, options in (("first", []), ("second", ["--sky-again"])):
+            out = self.folder / name
+            self.succeed("reconstruct", data, "-o", out, *SMALL, "--levels", "2", "--passes", "4", "--depth", "--no-bp", "--no-refine",
+                         "--no-mesh", "--no-render", "--illumination", "sky", *options)
+            summary = json.loads((out / "summary.json").read_text())
+            depths = {view: read_exr(out / f"depth/{view}.exr")["A"] for view in cloud}
+            opacity = [depths[view][y][x] for view, pixels in cloud.items() for x, y in pixels]
+            found[name] = (summary["skies"][0]["mask_share"], sum(opacity) / len(opacity), summary)
+        self.assertGreater(found["first"][1], 0.9)  # what is no sky must be built
+        self.assertLess(found["second"][1], 0.1)
+        self.assertGreater(found["second"][0], found["first"][0] + 0.02)
+        again = found["second"][2]["skies_again"][0]
+        self.assertEqual((again["node"], again["taken"]), ("n00", True))
+        self.assertEqual((again["mask_share_before"], again["mask_share"]), (found["first"][0], found["second"][0]))
+
+    def test_a_second_fit_that_cannot_be_is_named(self):
+        for why, options in (("taken from --sky RUN", ["--sky", self.skies]), ("no skies are fitted", ["--illumination", "none"]),
+                             ("but one level", ["--illumination", "sky", "--levels", "1"])):
+            with self.subTest(why):
+                _, summary = self.reconstruct("idle", "--sky-again", *options)
+                self.assertTrue(any(w.startswith("--sky-again has no effect here") and why in w for w in summary["warnings"]), summary["warnings"])
 
     def test_a_killed_run_goes_on_with_its_light_and_the_skies_that_it_found(self):
         for name, arguments in (("again", ["--illumination", "sky", "--sky-again"]),
@@ -361,6 +487,67 @@ class LightInReconstruct(SkyCase):
                           "--illumination", "none")
         self.expect_error(2, "--sky-masks", "reconstruct", self.street, "-o", self.folder / "no", "--sky-masks", self.folder,
                           "--illumination", "sky")
+
+    def street_with(self, name, change):
+        """The street again with other keys in its frames."""
+        data = json.loads((self.street / "transforms.json").read_text())
+        for frame in data["frames"]:
+            for key in ("file_path", "mask_path", "depth_path", "albedo_path", "normal_path", "sky_path"):
+                frame[key] = str(self.street / frame[key])
+            change(frame)
+        path = self.folder / f"{name}.json"
+        path.write_text(json.dumps(data))
+        return path
+
+    def reconstruct_with(self, name, data, *arguments):
+        out = self.folder / f"run-{name}"
+        options = [option for option in SMALL if option != "--quiet"]
+        done = self.succeed("reconstruct", data, "-o", out, *options, *arguments)
+        return out, json.loads((out / "summary.json").read_text()), done.stderr
+
+    def test_a_node_at_night_has_a_gain_and_no_mask(self):
+        def night(frame):
+            if frame["node"] == 0: frame["time_utc"] = "2023-06-15T00:30:00Z"
+
+        out, summary, said = self.reconstruct_with("night", self.street_with("night", night), "--illumination", "sky", "--levels", "2", "--verbose")
+        warning = next(w for w in summary["warnings"] if "out of 28 of 48 views" in w)
+        self.assertIn("20 night (n00)", warning)
+        self.assertIn(warning, said)
+        masks = [f for f in files_below(out) if f.startswith("sky/mask/")]
+        self.assertEqual((len(masks), len([f for f in masks if "n00_" in f])), (28, 0))
+        lights = self.lights(summary)
+        self.assertEqual([len(lights[node]) for node in ("n00", "n01", "n02")], [1, 1, 1])
+        self.assertNotEqual(lights["n00"], {(1, 1, 1)})
+        self.assertEqual({record["fitted_views"] for record in summary["light"]}, {20})
+        self.assertEqual(summary["scene"]["background"]["kind"], "mask")
+
+    def test_without_any_light_each_node_says_why(self):
+        def night(frame): frame["time_utc"] = f"2023-06-{15 + frame['node']}T00:30:00Z"
+
+        data = self.street_with("dark", night)
+        out, summary, said = self.reconstruct_with("dark", data)
+        self.assertEqual([(sky["node"], sky["fallback"]) for sky in summary["skies"]], [(f"n0{n}", "night") for n in range(3)])
+        self.assertIn("48 night (n00, n01, n02)", said)
+        self.assertEqual(summary["scene"]["light"]["illumination"], "none")
+        self.assertFalse([f for f in files_below(out) if f.startswith("sky/")])
+        for option in (["--illumination", "sky"], ["--background", "sky"]):
+            self.expect_error(2, "48 night (n00, n01, n02)", "reconstruct", data, "-o", self.folder / "no", *SMALL, *option)
+
+    def test_without_the_sun_light_is_not_taken_for_whole(self):
+        def no_time(frame): frame.pop("time_utc")
+
+        _, summary, said = self.reconstruct_with("no-time", self.street_with("no-time", no_time), "--illumination", "none", "--background", "sky")
+        self.assertEqual(summary["scene"]["background"]["kind"], "mask")
+        self.assertEqual(summary["scene"]["light"]["illumination"], "none")
+        self.assertEqual({sky["node"] for sky in summary["skies"]}, {"n00", "n01", "n02"})
+
+    def test_what_a_fit_warns_of_is_said(self):
+        def another_hour(frame): frame["time_utc"] = frame["time_utc"].replace("T08:30", "T14:30")
+
+        _, summary, said = self.reconstruct_with("wrong", self.street_with("wrong", another_hour), "--illumination", "sky")
+        apart = [w for w in summary["warnings"] if "degrees apart" in w]
+        self.assertTrue(apart)
+        for warning in apart: self.assertEqual(said.count(warning), 1)
 
     def test_the_mean_of_the_dome_is_another_light(self):
         skies = self.skies

@@ -97,7 +97,8 @@ class PixelDepthMarch {
     shares_.clear();
     RemovedColor removed;
     const Segment whole = march_.march(view, {0, x, y}, sample, ray, view.plan.range, sight, removed, steps_);
-    const float background = background_likelihood(pass_.opacity.background, pass_.opacity.model, sample);
+    const float background =
+        background_likelihood(pass_.opacity.background, pass_.opacity.model, view, sample);
     const float z = whole.likelihood + whole.transmittance * background;
     float transmittance = 1, total = 0, in_world = 0;
     for (std::size_t i = 0; i < steps_.size(); ++i) {

@@ -98,7 +98,7 @@ struct SamplePyramid::Builder {
 
 SamplePyramid::SamplePyramid(const Image& samples, const Mask& valid, const Mask& foreground,
                              int finest_level, int coarsest_level)
-    : finest_level_(finest_level) {
+    : finest_level_(finest_level), masked_(!foreground.empty()) {
   ROXEL_CHECK_EQ(samples.channels(), 3);
   ROXEL_CHECK_GE(finest_level, 0);
   ROXEL_CHECK_LE(finest_level, coarsest_level);

@@ -38,6 +38,8 @@ class SamplePyramid {
 
   int finest_level() const { return finest_level_; }
   int coarsest_level() const { return finest_level_ + static_cast<int>(levels_.size()) - 1; }
+  /// Whether it came with a foreground mask: else `foreground` says nothing.
+  bool masked() const { return masked_; }
   /// ceil(image width / 2^level), and height; of stored levels only.
   int width(int level) const { return levels_[level - finest_level_].width; }
   int height(int level) const { return levels_[level - finest_level_].height; }
@@ -93,6 +95,7 @@ class SamplePyramid {
   }
 
   int finest_level_;
+  bool masked_;
   std::vector<Level> levels_;             // levels_[i] is level finest_level_ + i
   std::vector<float> pixels_;             // level 0
   std::vector<std::uint8_t> valid_;       // level 0; empty = all 255

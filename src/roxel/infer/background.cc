@@ -14,7 +14,7 @@ float known_agreement(const Background& background, const MatchModel& model, con
 
 }  // namespace
 
-float background_likelihood(const Background& background, const MatchModel& model,
+float background_likelihood(const Background& background, const MatchModel& model, const SampleView& view,
                             const RegionStats& sample) {
   switch (background.kind) {
     case BackgroundKind::kNone:
@@ -24,7 +24,10 @@ float background_likelihood(const Background& background, const MatchModel& mode
     case BackgroundKind::kKnown:
       return known_agreement(background, model, sample) + model.outlier;
     case BackgroundKind::kMask:
-      return (1 - sample.foreground) + model.outlier;
+      if (view.pyramid->masked()) return (1 - sample.foreground) + model.outlier;
+      if (background.smooth_share <= 0) return background.unknown_likelihood;
+      return background.unknown_likelihood +
+             background.smooth_share * known_agreement(background, model, sample);
   }
   return 0;
 }

@@ -10,6 +10,14 @@ namespace {
 
 RegionStats sample_of(float l, float foreground) { return {{l, 0, 0}, {9, 9, 9, 0, 0, 0}, 1, foreground}; }
 
+/// A view of one pixel, with a mask or without.
+SampleView view_with(const Mask& foreground) {
+  SampleView view;
+  view.pyramid = std::make_shared<SamplePyramid>(Image(1, 1, 3), Mask(), foreground, 0, 0);
+  return view;
+}
+const SampleView kMasked = view_with(Mask(1, 1)), kUnmasked = view_with(Mask());
+
 Background background_of(BackgroundKind kind) {
   Background background;
   background.kind = kind;
@@ -32,14 +40,14 @@ double known_agreement(double d) {
 
 TEST(Background, NoneIsNeverSeen) {
   const Background none = background_of(BackgroundKind::kNone);
-  EXPECT_EQ(background_likelihood(none, {}, sample_of(20, 1)), 0);
+  EXPECT_EQ(background_likelihood(none, {}, kMasked, sample_of(20, 1)), 0);
   EXPECT_EQ(known_background_share(none, {}, sample_of(20, 1)), 0);
 }
 
 TEST(Background, UnknownIsAnyColourAlike) {
   const Background unknown = background_of(BackgroundKind::kUnknown);
   for (const float l : {0.0f, 20.0f, 90.0f})
-    EXPECT_EQ(background_likelihood(unknown, {}, sample_of(l, 1)), 0.002f);
+    EXPECT_EQ(background_likelihood(unknown, {}, kMasked, sample_of(l, 1)), 0.002f);
   EXPECT_EQ(known_background_share(unknown, {}, sample_of(20, 1)), 0);
 }
 
@@ -47,7 +55,8 @@ TEST(Background, KnownIsAgreementWithItsColour) {
   const Background known = background_of(BackgroundKind::kKnown);
   const MatchModel model = model_of_noise_4();
   for (const float l : {20.0f, 27.0f, 35.0f}) {
-    EXPECT_NEAR(background_likelihood(known, model, sample_of(l, 1)), known_agreement(l - 20) + 1e-7, 1e-6);
+    EXPECT_NEAR(background_likelihood(known, model, kUnmasked, sample_of(l, 1)),
+                known_agreement(l - 20) + 1e-7, 1e-6);
     EXPECT_NEAR(known_background_share(known, model, sample_of(l, 1)), known_agreement(l - 20), 1e-6);
   }
 }
@@ -55,9 +64,26 @@ TEST(Background, KnownIsAgreementWithItsColour) {
 TEST(Background, MaskIsTheShareCalledBackground) {
   const Background mask = background_of(BackgroundKind::kMask);
   for (const float foreground : {0.0f, 0.3f, 1.0f}) {
-    EXPECT_NEAR(background_likelihood(mask, {}, sample_of(20, foreground)), 1 - foreground + 1e-7, 1e-7);
+    EXPECT_NEAR(background_likelihood(mask, {}, kMasked, sample_of(20, foreground)), 1 - foreground + 1e-7,
+                1e-7);
     EXPECT_NEAR(known_background_share(mask, {}, sample_of(20, foreground)), 1 - foreground, 1e-7);
   }
+}
+
+TEST(Background, WithoutAMaskOfItsOwnAViewsBackgroundIsAnyColourAlike) {
+  const Background mask = background_of(BackgroundKind::kMask);
+  EXPECT_EQ(background_likelihood(mask, {}, kUnmasked, sample_of(20, 1)), 0.002f);
+  EXPECT_EQ(known_background_share(mask, {}, sample_of(20, 1)), 0);
+}
+
+TEST(Background, WithoutAMaskItMayBeSmooth) {
+  Background mask = background_of(BackgroundKind::kMask);
+  mask.smooth_share = 0.25f;
+  const MatchModel model = model_of_noise_4();
+  for (const float l : {20.0f, 35.0f})
+    EXPECT_NEAR(background_likelihood(mask, model, kUnmasked, sample_of(l, 1)),
+                0.002 + 0.25 * known_agreement(l - 20), 1e-6);
+  EXPECT_NEAR(background_likelihood(mask, model, kMasked, sample_of(20, 1)), 1e-7, 1e-9);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ LogSum background_of(const SampleView& view, const Region& region, const MarchOp
     for (int x = region.x << halvings; x < x1; ++x) {
       const RegionStats sample = pyramid.at(level, x, y);
       if (sample.valid <= 0) continue;
-      const float here = background_likelihood(options.background, options.model, sample);
+      const float here = background_likelihood(options.background, options.model, view, sample);
       if (here != likelihood) {
         likelihood = here;
         log_likelihood = std::log(std::max(here, kLeast));
@@ -129,7 +129,8 @@ void OpacityPackets::look_behind(const SampleView& view) {
     if (total > 0)
       sample.behind = std::exp(log_sum / total);
     else if (sample.ends)
-      sample.behind = background_likelihood(options_.background, options_.model, stats_of(view, sample));
+      sample.behind =
+          background_likelihood(options_.background, options_.model, view, stats_of(view, sample));
     sample.z = sample.own.likelihood + sample.own.transmittance * sample.behind;
   }
 }

@@ -54,17 +54,25 @@ inline double twin_agreement(const MatchModel& model, const Eigen::Vector3d& d, 
   return std::sqrt(noise.determinant() / s_12.determinant()) * std::exp(-0.5 * d.dot(s_12.inverse() * d));
 }
 
-inline double twin_known_share(const Background& background, const MatchModel& model,
-                               const RegionStats& sample) {
-  if (background.kind != BackgroundKind::kKnown) return 0;
+inline double twin_background_agreement(const Background& background, const MatchModel& model,
+                                        const RegionStats& sample) {
   return twin_agreement(model, twin_vector(background.mean) - twin_vector(sample.mean),
                         twin_matrix(background.cov) + twin_matrix(sample.cov));
 }
 
-inline double twin_background(const Background& background, const MatchModel& model,
+inline double twin_known_share(const Background& background, const MatchModel& model,
+                               const RegionStats& sample) {
+  if (background.kind != BackgroundKind::kKnown) return 0;
+  return twin_background_agreement(background, model, sample);
+}
+
+inline double twin_background(const Background& background, const MatchModel& model, bool masked,
                               const RegionStats& sample) {
   if (background.kind == BackgroundKind::kNone) return 0;
   if (background.kind == BackgroundKind::kUnknown) return background.unknown_likelihood;
+  if (background.kind == BackgroundKind::kMask && !masked)
+    return background.unknown_likelihood +
+           background.smooth_share * twin_background_agreement(background, model, sample);
   if (background.kind == BackgroundKind::kMask) return 1 - sample.foreground + model.outlier;
   return twin_known_share(background, model, sample) + model.outlier;
 }
@@ -191,7 +199,8 @@ class PassTwin {
         best = std::max(best, child.path_sum);
         node.children.push_back(std::move(child));
       }
-    node.background_likelihood = twin_background(options_.opacity.background, options_.opacity.model, stats);
+    node.background_likelihood =
+        twin_background(options_.opacity.background, options_.opacity.model, view.pyramid->masked(), stats);
     node.path_sum += node.children.empty() ? node.background_likelihood : best;
     node.z =
         node.likelihood + node.transmittance * (node.children.empty() ? node.background_likelihood

@@ -86,7 +86,7 @@ class OpacityMarch {
       behind = add_children(in_sight, region, std::max(range.begin, range.end), removed, self);
     float background = 0;
     if (ends || spent || behind.z <= 0) {
-      background = background_likelihood(options_.background, options_.model, sample);
+      background = background_likelihood(options_.background, options_.model, view, sample);
       if (ends || spent) behind.z = background;
       behind.best_path_sum = std::max(behind.best_path_sum, background);
     }

@@ -220,6 +220,14 @@ const BadSet kBadSets[] = {
     {"LongitudeOutOfRange", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"longitude\": -200"), {"frames[0].longitude", "-200", "-180 to 180"}},
     {"TimeWithoutZone", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"time_utc\": \"2003-08-21T16:50:00\""), {"frames[0].time_utc", "'2003-08-21T16:50:00'", "zone"}},
     {"DayThatIsNone", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"time_utc\": \"2003-02-30T16:50:00Z\""), {"frames[0].time_utc", "2003-02-30"}},
+    {"TimeOfANodeWithoutZone", Base::kTransforms, [](const fs::path& set) {
+       replace("transforms.json", "\"near\": 1", "\"node\": 7")(set);
+       replace("transforms.json", "{", "{\"nodes\": [{}, {\"node\": 7, \"time_utc\": \"2003-08-21T16:50:00\"}],")(set);
+     }, {"transforms.json: nodes[1].time_utc", "'2003-08-21T16:50:00'", "zone"}},
+    {"TwoEntriesOfANode", Base::kTransforms, [](const fs::path& set) {
+       replace("transforms.json", "\"near\": 1", "\"node\": 7")(set);
+       replace("transforms.json", "{", "{\"nodes\": [{\"node\": 7, \"time_utc\": \"2003-08-21T16:50:00Z\"}, {\"node\": 7, \"time_utc\": \"2003-08-22T16:50:00Z\"}],")(set);
+     }, {"transforms.json: nodes[1]", "node 7 as nodes[0]"}},
     {"NodeNotWhole", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"node\": 1.5"), {"frames[0].node", "1.5", "a whole number"}},
     {"UnknownModelInJson", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"camera_model\": \"EQUIRECT\""), {"frames[0].camera_model", "'EQUIRECT'", "OPENCV_FISHEYE"}},
     {"PinholeWithDistortion", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"camera_model\": \"PINHOLE\", \"k1\": 0.1"), {"frames[0].k1", "0.1", "PINHOLE does not have it"}},

@@ -18,21 +18,28 @@ using nlohmann::json;
 
 std::string shown(const json& value) { return escaped(value.dump(), 120); }
 
-/// Looks keys up in a frame, then in the top level: what all frames share may stand in either place.
+const json* find_value(const json& object, const std::string& key) {
+  const auto found = object.find(key);
+  return found != object.end() && !found->is_null() ? &*found : nullptr;
+}
+
+/// Looks keys up in a frame, then in the top level: what all frames share may stand in either place. Time and
+/// place may stand in an entry of the list `nodes`, too, for all frames of that node.
 class FrameKeys {
  public:
-  FrameKeys(const json& top, const json& frame, std::string where)
-      : top_(top), frame_(frame), where_(std::move(where)) {}
+  FrameKeys(const json& top, const json& frame, const std::string& file, std::string where)
+      : top_(top), frame_(frame), file_(file), where_(std::move(where)) {}
 
   const std::string& where() const { return where_; }
-  std::string where(const std::string& key) const { return where_ + "." + key; }
+  std::string where(const std::string& key) const {
+    const std::optional<std::size_t> entry = find_value(frame_, key) ? std::nullopt : node_entry(key);
+    return (entry ? file_ + ": nodes[" + std::to_string(*entry) + "]" : where_) + "." + key;
+  }
 
   const json* find(const std::string& key) const {
-    for (const json* level : {&frame_, &top_}) {
-      const auto found = level->find(key);
-      if (found != level->end() && !found->is_null()) return &*found;
-    }
-    return nullptr;
+    if (const json* own = find_value(frame_, key)) return own;
+    if (const auto entry = node_entry(key)) return find_value(top_["nodes"][*entry], key);
+    return find_value(top_, key);
   }
 
   std::optional<double> number(const std::string& key) const {
@@ -61,8 +68,30 @@ class FrameKeys {
   }
 
  private:
+  /// The entry of `nodes` that has the key and is of the frame's node.
+  std::optional<std::size_t> node_entry(const std::string& key) const {
+    static constexpr const char* kOfNodes[] = {"time_utc", "latitude", "lat", "longitude", "lon"};
+    if (std::find(std::begin(kOfNodes), std::end(kOfNodes), key) == std::end(kOfNodes)) return std::nullopt;
+    const json* nodes = find_value(top_, "nodes");
+    const json* node = find_value(frame_, "node");
+    if (!nodes || !nodes->is_array() || !node) return std::nullopt;
+    std::optional<std::size_t> entry;
+    for (std::size_t i = 0; i < nodes->size(); ++i) {
+      const json& candidate = (*nodes)[i];
+      if (!candidate.is_object() || !find_value(candidate, key)) continue;
+      if (const json* id = find_value(candidate, "node"); !id || *id != *node) continue;
+      if (entry)
+        throw_invalid(file_ + ": nodes[" + std::to_string(i) + "]",
+                      "node " + shown(*node) + " as nodes[" + std::to_string(*entry) + "] has",
+                      "one entry a node");
+      entry = i;
+    }
+    return entry;
+  }
+
   const json& top_;
   const json& frame_;
+  std::string file_;
   std::string where_;
 };
 
@@ -374,7 +403,7 @@ Dataset read_transforms(const fs::path& path) {
   for (std::size_t i = 0; i < frames->size(); ++i) {
     const std::string where = file.string() + ": frames[" + std::to_string(i) + "]";
     if (!(*frames)[i].is_object()) throw_invalid(where, shown((*frames)[i]), "an object");
-    dataset.views.push_back(read_frame(FrameKeys(top, (*frames)[i], where), folder));
+    dataset.views.push_back(read_frame(FrameKeys(top, (*frames)[i], file.string(), where), folder));
   }
   name_views(folder, dataset.views);
   dataset.scene_bounds = read_scene_bounds(top, file);

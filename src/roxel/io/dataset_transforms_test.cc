@@ -111,6 +111,22 @@ TEST(Transforms, OwnKeysAreRead) {
   EXPECT_EQ(dataset.scene_bounds->min(), Eigen::Vector3d(-1, -2, -3));
 }
 
+TEST(Transforms, TimeAndPlaceMayStandInTheListOfNodes) {
+  const std::string nodes =
+      "\"lat\": 1, \"nodes\": [{\"node\": 6, \"time_utc\": \"1970-01-03T00:00:00Z\"}, "
+      "{\"node\": 7, \"time_utc\": \"1970-01-02T00:00:00Z\", \"lat\": 2, \"near\": 3}], ";
+  const View of_node = read_one("\"fl_x\": 40, \"node\": 7, ", nodes).views[0];
+  EXPECT_EQ(of_node.time_utc_s, 86400);
+  EXPECT_EQ(of_node.latitude_deg, 2);
+  EXPECT_FALSE(of_node.near.has_value());
+  const View own =
+      read_one("\"fl_x\": 40, \"node\": 7, \"time_utc\": \"1970-01-01T00:00:09Z\", ", nodes).views[0];
+  EXPECT_EQ(own.time_utc_s, 9);
+  EXPECT_EQ(read_one("\"fl_x\": 40, \"node\": 6, ", nodes).views[0].latitude_deg, 1);
+  EXPECT_FALSE(read_one("\"fl_x\": 40, \"node\": 8, ", nodes).views[0].time_utc_s.has_value());
+  EXPECT_FALSE(read_one("\"fl_x\": 40, ", nodes).views[0].time_utc_s.has_value());
+}
+
 TEST(Transforms, MaskPathIsRelativeToTheFile) {
   const TempFolder set;
   write_image(set.path() / "images/a.png", 32, 24);

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "roxel/base/error.h"
@@ -13,6 +14,9 @@ namespace roxel {
 namespace {
 
 constexpr double kSameSky_s = 900;
+constexpr double kSamePlace_deg = 0.01;  ///< a kilometre: what coordinates of one place may differ by
+constexpr double kApart =
+    10;  ///< two groups of cameras this many times as far apart as either is wide are two
 
 /// The direction that cameras hold upright: cameras tilt, but they seldom roll, so it is the one that their
 /// rows of pixels are most at right angles to.
@@ -71,6 +75,113 @@ void check_one_time(const Dataset& dataset, const Node& node) {
   }
 }
 
+void check_one_place(const Dataset& dataset, const Node& node) {
+  struct Coordinate {
+    std::optional<double> View::*field;
+    const char* name;
+  };
+  for (const Coordinate& c :
+       {Coordinate{&View::latitude_deg, "latitude"}, {&View::longitude_deg, "longitude"}}) {
+    const View* first = nullptr;
+    for (const int v : node.view_idxs) {
+      const View& view = dataset.views[v];
+      if (!(view.*c.field)) continue;
+      if (!first) first = &view;
+      if (std::abs(std::remainder(*(view.*c.field) - *(first->*c.field), 360)) > kSamePlace_deg)
+        throw_invalid(view.source + ": node " + std::to_string(*view.node_id),
+                      formatted("a %s of %g, while %s, which has the same node, has %g", c.name,
+                                *(view.*c.field), first->source.c_str(), *(first->*c.field)),
+                      "one place a node (two nodes of the same name?)");
+    }
+  }
+}
+
+/// A node's views in two parts, on both sides of the widest gap between its cameras.
+struct Halves {
+  std::array<std::vector<int>, 2> view_idxs;
+  double gap = 0;    ///< between the nearest cameras of the two
+  double width = 0;  ///< of the wider one: the largest distance of its cameras from its first
+  std::array<Eigen::Vector3d, 2> centres;
+};
+
+/// The longest link of the tree of shortest links between all cameras parts them.
+Halves halves_of(const Dataset& dataset, const Node& node) {
+  const std::size_t count = node.view_idxs.size();
+  const auto centre = [&](std::size_t i) -> const Eigen::Vector3d& {
+    return dataset.views[node.view_idxs[i]].camera.pose.centre;
+  };
+  std::vector<double> to_tree(count, std::numeric_limits<double>::infinity());
+  std::vector<std::size_t> parent(count, 0), order{0};
+  std::vector<char> in_tree(count, 0);
+  in_tree[0] = 1;
+  while (order.size() < count) {
+    std::size_t nearest = count;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (in_tree[i]) continue;
+      const double apart = (centre(i) - centre(order.back())).norm();
+      if (apart < to_tree[i]) to_tree[i] = apart, parent[i] = order.back();
+      if (nearest == count || to_tree[i] < to_tree[nearest]) nearest = i;
+    }
+    in_tree[nearest] = 1;
+    order.push_back(nearest);
+  }
+  std::size_t last = 0;
+  for (std::size_t n = 1; n < count; ++n)
+    if (last == 0 || to_tree[order[n]] > to_tree[order[last]]) last = n;
+  Halves halves;
+  std::vector<char> beyond(count, 0);
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t i = order[n];
+    beyond[i] = n > 0 && (n == last || beyond[parent[i]]);
+    halves.view_idxs[beyond[i]].push_back(node.view_idxs[i]);
+  }
+  halves.gap = last > 0 ? to_tree[order[last]] : 0;
+  for (int h = 0; h < 2; ++h) {
+    halves.centres[h] = Eigen::Vector3d::Zero();
+    for (const int v : halves.view_idxs[h]) {
+      const Eigen::Vector3d& x = dataset.views[v].camera.pose.centre;
+      halves.centres[h] += x / static_cast<double>(halves.view_idxs[h].size());
+      halves.width =
+          std::max(halves.width, (x - dataset.views[halves.view_idxs[h].front()].camera.pose.centre).norm());
+    }
+  }
+  return halves;
+}
+
+/// How far nodes typically are from their next, counting the two parts of one as two; 0: there is no other.
+double node_spacing(const Dataset& dataset, const Node& node, const Halves& halves) {
+  std::vector<Eigen::Vector3d> places(halves.centres.begin(), halves.centres.end());
+  for (const Node& other : dataset.nodes)
+    if (&other != &node) places.push_back(other.centre);
+  if (places.size() < 3) return 0;
+  std::vector<double> nearest(places.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t j = 0; j < places.size(); ++j)
+      if (j != i) nearest[i] = std::min(nearest[i], (places[i] - places[j]).norm());
+  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
+  std::nth_element(nearest.begin(), middle, nearest.end());
+  return *middle;
+}
+
+/// A node's name may be a loose label; but cameras in two places, each small beside the gap between them, are
+/// likely to be two nodes.
+void check_one_centre(const Dataset& dataset, const Node& node, std::vector<std::string>& warnings) {
+  if (node.view_idxs.size() < 2) return;
+  const Halves halves = halves_of(dataset, node);
+  const double spacing = node_spacing(dataset, node, halves);
+  if (!(halves.gap > kApart * halves.width) || !(halves.gap > spacing / kApart)) return;
+  const View& one = dataset.views[halves.view_idxs[0].front()];
+  const View& other = dataset.views[halves.view_idxs[1].front()];
+  const std::string where = other.source + ": node " + std::to_string(*other.node_id);
+  const std::string found =
+      formatted("a camera %.4g from that of %s, which has the same node", halves.gap, one.source.c_str());
+  if (spacing > 0 && halves.gap > spacing)
+    throw_invalid(where, found + formatted("; nodes are %.4g apart", spacing),
+                  "one place a node (two nodes of the same name?)");
+  warnings.push_back(where + ": " + found +
+                     ": they are taken to be under one sky (two nodes of the same name?)");
+}
+
 /// Views of one place, apart by time; without times all together.
 std::vector<std::vector<int>> split_by_time(const Dataset& dataset, const Node& node) {
   std::vector<int> views = node.view_idxs;
@@ -90,13 +201,15 @@ struct Group {
   std::vector<int> views;
 };
 
-std::vector<Group> group_views(const Dataset& dataset) {
+std::vector<Group> group_views(const Dataset& dataset, std::vector<std::string>& warnings) {
   std::vector<Group> groups;
   std::map<double, std::size_t> by_time;  // of single views
   for (const Node& node : dataset.nodes) {
     const View& first = dataset.views[node.view_idxs.front()];
     if (first.node_id) {
       check_one_time(dataset, node);
+      check_one_place(dataset, node);
+      check_one_centre(dataset, node, warnings);
       groups.push_back({first.node_id, node.view_idxs});
       continue;
     }
@@ -127,8 +240,9 @@ DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<do
           ? Eigen::Matrix3d(Eigen::Matrix3d::Identity())
           : Eigen::Quaterniond::FromTwoVectors(upwards, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   int next = 0;
-  for (const Group& group : group_views(dataset)) next = std::max(next, group.id.value_or(-1) + 1);
-  for (Group& group : group_views(dataset)) {
+  std::vector<Group> groups = group_views(dataset, skies.warnings);
+  for (const Group& group : groups) next = std::max(next, group.id.value_or(-1) + 1);
+  for (Group& group : groups) {
     SkyTask task;
     task.name = node_name(group.id ? *group.id : next++);
     for (const int v : group.views) task.views.push_back(dataset.views[v].name);

@@ -72,6 +72,67 @@ TEST(SkyTasks, TwoNodesOfOneNameAreAnErrorThatNamesTheFrames) {
   }
 }
 
+View placed(View v, double latitude, double longitude) {
+  v.latitude_deg = latitude, v.longitude_deg = longitude;
+  return v;
+}
+
+TEST(SkyTasks, OneNodeInTwoCitiesIsAnErrorThatNamesTheFrames) {
+  const auto tasks = [](double latitude, double longitude) {
+    return sky_tasks(dataset({placed(view("a", {0, 0, 0}, 0, 2), 42.36, -71.09), view("b", {0, 0, 0}, 0, 2),
+                              placed(view("c", {0, 0, 0}, 0, 2), latitude, longitude)}));
+  };
+  EXPECT_EQ(tasks(42.365, -71.095).tasks.size(), 1u);
+  for (const auto& [latitude, longitude, what] :
+       {std::tuple{-33.0, -71.09, "a latitude of -33, while frames of a"},
+        {42.36, 151.0, "a longitude of 151"}})
+    try {
+      tasks(latitude, longitude);
+      FAIL();
+    } catch (const InvalidInput& error) {
+      EXPECT_THAT(error.what(), HasSubstr("frames of c: node 2: found "));
+      EXPECT_THAT(error.what(), HasSubstr(what));
+    }
+  // Both sides of the date line are one place.
+  EXPECT_EQ(sky_tasks(dataset({placed(view("a", {0, 0, 0}, 0, 2), 0, 179.999),
+                               placed(view("b", {0, 0, 0}, 0, 2), 0, -179.999)}))
+                .tasks.size(),
+            1u);
+}
+
+/// Three nodes 10 apart, of two views each, and a view "x" of node 1 (which stands at 0) at a distance.
+Dataset three_nodes_and(double distance) {
+  std::vector<View> views;
+  for (int n = 1; n <= 3; ++n)
+    for (const char* name : {"a", "b"})
+      views.push_back(view(name + std::to_string(n), {10.0 * (n - 1), 0, 0}, {}, n));
+  views.push_back(view("x", {0, distance, 0}, {}, 1));
+  return dataset(views);
+}
+
+TEST(SkyTasks, OneNodeInTwoPlacesFartherApartThanNodesIsAnErrorThatNamesTheFrames) {
+  try {
+    sky_tasks(three_nodes_and(30));
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_THAT(error.what(), HasSubstr("frames of x: node 1: found a camera 30 from that of frames of a1"));
+    EXPECT_THAT(error.what(), HasSubstr("nodes are 10 apart"));
+  }
+}
+
+TEST(SkyTasks, OneNodeInTwoPlacesThatMayBeALooseLabelIsAWarning) {
+  const auto warnings = [](const Dataset& of) { return sky_tasks(of).warnings; };
+  EXPECT_THAT(warnings(three_nodes_and(0.5)), ElementsAre());
+  EXPECT_THAT(warnings(three_nodes_and(5)), ElementsAre(HasSubstr("frames of x: node 1: a camera 5 from")));
+  // No other node says how far apart they are; and a path is no pair of places.
+  EXPECT_THAT(warnings(dataset({view("a", {0, 0, 0}, {}, 4), view("b", {30, 0, 0}, {}, 4)})),
+              ElementsAre(HasSubstr("frames of b: node 4: a camera 30 from that of frames of a")));
+  std::vector<View> path;
+  for (int i = 0; i < 12; ++i) path.push_back(view("p" + std::to_string(i), {double(i), 0, 0}, {}, 4));
+  EXPECT_THAT(warnings(dataset(path)), ElementsAre());
+  EXPECT_THAT(warnings(dataset({view("a", {0, 0, 0}), view("b", {30, 0, 0})})), ElementsAre());
+}
+
 TEST(SkyTasks, UpIsWhereCamerasHoldItThoughTheyTilt) {
   // A world with up = -Y; cameras look around and tilt up by 40 degrees.
   std::vector<View> views;

@@ -6,6 +6,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/color/color_gaussian.h"
+#include "roxel/image/local_light.h"
 
 namespace roxel {
 
@@ -72,6 +73,22 @@ std::array<float, 3> in_matching_space(const std::array<double, 3>& rgb, const S
   return color;
 }
 
+/// Of views whose sky is not known, where colours are compared without local light: what is smooth, the sky
+/// above all, then looks like mean grey, with half its tint (docs/light.md).
+void expect_smooth(Scene& scene) {
+  constexpr float kSmoothShare = 0.5f, kBrighter = 0.1f, kTint = 0.25f;
+  std::vector<std::array<float, 3>> colors;
+  for (const float brighter : {-kBrighter, 0.0f, kBrighter})
+    for (const float tint : {-kTint, 0.0f, kTint}) {
+      const float grey = static_cast<float>(LocalLightOptions().mean_level) * std::exp(brighter);
+      std::array<float, 3> color{grey * std::exp(tint), grey, grey * std::exp(-tint)};
+      scene.transform.from_rgb(color.data(), color.data());
+      colors.push_back(color);
+    }
+  fit_constant(colors, colors.front(), 1e9, scene.background);
+  scene.background.smooth_share = kSmoothShare;
+}
+
 void choose_automatically(const std::vector<std::array<float, 3>>& colors, Scene& scene) {
   const double noise = std::sqrt(scene.model.noise_variance[0]);
   if (!colors.empty()) {
@@ -99,6 +116,13 @@ BackgroundChoice chosen_kind(const ReconstructOptions& options) {
   throw_invalid("--background-color", "another --background", "--background constant, or none given");
 }
 
+[[noreturn]] void throw_without_sky(const Daylight* daylight) {
+  const std::string reasons = daylight ? reasons_without_light(*daylight) : "";
+  throw_invalid("--background sky",
+                "no photograph whose sky is known" + (reasons.empty() ? "" : ": " + reasons),
+                "photographs that show the sky, or another --background");
+}
+
 }  // namespace
 
 BorderSample sample_border(const Photograph& photo) {
@@ -118,11 +142,13 @@ BorderSample sample_border(const Photograph& photo) {
 }
 
 void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options,
-                       Scene& scene) {
+                       const Daylight* daylight, Scene& scene) {
   std::size_t masked = 0;
+  const bool sky_masks = daylight && daylight->has_masks();
   std::vector<std::array<float, 3>> colors;
   for (const BorderSample& border : borders) {
     masked += border.has_mask;
+    scene.masked.push_back(border.has_mask);
     for (std::array<float, 3> color : border.colors) {
       for (float& c : color) c /= static_cast<float>(scene.exposure);
       scene.transform.from_rgb(color.data(), color.data());
@@ -153,12 +179,20 @@ void choose_background(const std::vector<BorderSample>& borders, const Reconstru
                       "a mask for every image");
       background.kind = BackgroundKind::kMask;
       return;
+    case BackgroundChoice::kSky:
+      if (!sky_masks) throw_without_sky(daylight);
+      break;
     case BackgroundChoice::kAuto:
       break;
   }
-  if (!borders.empty() && masked == borders.size()) {
+  if (!borders.empty() && (masked == borders.size() || (sky_masks && masked > 0))) {
     background.kind = BackgroundKind::kMask;
-    scene.notes.push_back("background: mask, because every image has one");
+    if (masked < borders.size() && scene.light.local_matching) expect_smooth(scene);
+    scene.notes.push_back(masked == borders.size()
+                              ? "background: mask, because every image has one"
+                              : "background: mask, and unknown for the " +
+                                    std::to_string(borders.size() - masked) + " of " +
+                                    std::to_string(borders.size()) + " images whose sky is not known");
     return;
   }
   choose_automatically(colors, scene);

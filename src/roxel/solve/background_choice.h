@@ -13,9 +13,10 @@ struct BorderSample {
 
 BorderSample sample_border(const Photograph& photo);
 
-/// Chooses, or obeys options.background, under scene.exposure and scene.transform; appends to scene.notes
-/// why. Throws InvalidInput where masks are asked for and missing.
+/// Chooses, or obeys options.background, under scene.exposure and scene.transform, and sets scene.masked;
+/// appends to scene.notes why. `daylight` where it is known, else null: its masks count where there are some,
+/// those of objects where there are all. Throws InvalidInput where masks are asked for and missing.
 void choose_background(const std::vector<BorderSample>& borders, const ReconstructOptions& options,
-                       Scene& scene);
+                       const Daylight* daylight, Scene& scene);
 
 }  // namespace roxel

@@ -39,11 +39,12 @@ Scene luv_scene() {
   return scene;
 }
 
-Scene chosen(const std::vector<Photograph>& photos, const ReconstructOptions& options) {
+Scene chosen(const std::vector<Photograph>& photos, const ReconstructOptions& options,
+             const Daylight* daylight = nullptr) {
   Scene scene = luv_scene();
   std::vector<BorderSample> borders;
   for (const Photograph& photo : photos) borders.push_back(sample_border(photo));
-  choose_background(borders, options, scene);
+  choose_background(borders, options, daylight, scene);
   return scene;
 }
 
@@ -70,6 +71,32 @@ TEST(BackgroundChoice, OneImageWithoutMaskIsEnoughToIgnoreMasks) {
   const Scene scene =
       chosen({photo_of({0, 0, 0}, {1, 0, 0}, true), photo_of({0, 0, 0}, {1, 0, 0}, false)}, {});
   EXPECT_EQ(scene.background.kind, BackgroundKind::kKnown);
+}
+
+TEST(BackgroundChoice, MasksOfTheSkyCountWhereThereAreSomeAndTheOthersAreOpen) {
+  const std::vector<Photograph> photos{photo_of({0, 0, 0}, {1, 0, 0}, true),
+                                       photo_of({0, 0, 0}, {1, 0, 0}, false)};
+  NodeSky sky, night;
+  sky.model = SkyModel::kPerez;
+  sky.sun_source = SunSource::kTime;
+  night.name = "n07";
+  night.fallback = "night";
+  const Daylight daylight{{sky, night}, {0, 1}, {1, 0}}, dark{{night}, {0, 0}, {0, 0}};
+  for (const BackgroundChoice choice : {BackgroundChoice::kAuto, BackgroundChoice::kSky}) {
+    const Scene scene = chosen(photos, with(choice), &daylight);
+    EXPECT_EQ(scene.background.kind, BackgroundKind::kMask);
+    EXPECT_EQ(scene.masked, (std::vector<std::uint8_t>{1, 0}));
+    EXPECT_TRUE(scene.has_open_ends());
+    EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("unknown for the 1 of 2 images")));
+    EXPECT_FALSE(chosen({photos[0], photos[0]}, with(choice), &daylight).has_open_ends());
+  }
+  for (const Daylight* missing : {&dark, static_cast<const Daylight*>(nullptr)}) try {
+      chosen(photos, with(BackgroundChoice::kSky), missing);
+      FAIL() << "no error";
+    } catch (const InvalidInput& error) {
+      EXPECT_THAT(error.what(),
+                  HasSubstr(missing ? "is known: 2 night (n07)" : "no photograph whose sky is known"));
+    }
 }
 
 TEST(BackgroundChoice, UniformBordersAreAConstant) {

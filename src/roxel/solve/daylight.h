@@ -3,6 +3,7 @@
 /// light is worth ([Jethwa04] section 7.2.3; docs/light.md).
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -18,12 +19,23 @@ enum class DomeLight {
 
 struct Daylight {
   std::vector<NodeSky> skies;
-  std::vector<int> sky_of_views;  ///< one a view; -1 where none is known
-  bool masks = false;             ///< photographs come with masks that call the sky background
+  std::vector<int> sky_of_views;         ///< one a view; -1 where none is known
+  std::vector<std::uint8_t> sky_masked;  ///< one a view, 1: it comes with a mask that calls the sky
+                                         ///< background; empty: none does
 
-  /// Of a view; null where no light is known.
+  /// Of a view; null where its light is not known as a whole.
   const NodeSky* of_view(int view_idx) const;
+  bool has_masks() const;
 };
+
+/// Why a node's light is not known as a whole; empty where it is. That takes a model, and the sun's place,
+/// which most of the light comes from, unless the sky is evidently overcast: neutral, and brighter at the
+/// zenith than above the horizon.
+std::string why_no_light(const NodeSky& sky);
+
+/// "3 night (n03, n04), 1 sun not known (n05)": why views have no light, by how many; of those that no sky is
+/// of, too. Empty where all have.
+std::string reasons_without_light(const Daylight& daylight);
 
 /// The geometric mean over the views of the luminance of their domes' light, the sun's disc included; 0 where
 /// no view has one.

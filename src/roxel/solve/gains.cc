@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "roxel/base/parallel.h"
 #include "roxel/march/render.h"
@@ -81,6 +82,44 @@ std::optional<std::array<double, 3>> fit_view(const LatticeStack& stack,
   return log_gain(photo, rendering, factor, scene.exposure);
 }
 
+/// Views under one sky have one gain: of few photographs of one place, each alone shows too little that
+/// others see.
+void share_gains(const Light& light, std::vector<std::array<double, 3>>& logs, std::vector<char>& fitted) {
+  std::map<int, std::vector<int>> views_of_sky;
+  for (std::size_t v = 0; v < light.shared.size(); ++v)
+    if (light.is_gain(static_cast<int>(v)) && light.shared[v] >= 0)
+      views_of_sky[light.shared[v]].push_back(static_cast<int>(v));
+  for (const auto& [sky, views] : views_of_sky) {
+    std::array<std::vector<double>, 3> gains;
+    for (const int v : views)
+      for (int c = 0; c < 3 && fitted[v]; ++c) gains[c].push_back(logs[v][c]);
+    if (gains[0].empty()) continue;
+    std::array<double, 3> shared;
+    for (int c = 0; c < 3; ++c) shared[c] = huber_mean(gains[c]);
+    for (const int v : views) logs[v] = shared, fitted[v] = 1;
+  }
+}
+
+bool has_domes(const Light& light) { return light.from == LightSource::kSky; }
+
+/// What is to be taken off the logarithms, so that the gains have one scale: their mean, or, where views have
+/// the light of their dome, the mean of what these are off it.
+std::array<double, 3> common_scale(const std::vector<std::array<double, 3>>& logs,
+                                   const std::vector<char>& fitted, const Light& light) {
+  std::array<double, 3> sum{0, 0, 0};
+  int counted = 0;
+  for (std::size_t v = 0; v < logs.size(); ++v) {
+    const int view = static_cast<int>(v);
+    if (has_domes(light) && (light.is_gain(view) || !fitted[v])) continue;
+    ++counted;
+    for (int c = 0; c < 3; ++c)
+      sum[c] +=
+          has_domes(light) ? logs[v][c] - std::log(static_cast<double>(light.of_view(view)[c])) : logs[v][c];
+  }
+  for (double& value : sum) value /= std::max(1, counted);
+  return sum;
+}
+
 }  // namespace
 
 std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Rendering& rendering, int factor,
@@ -106,14 +145,22 @@ std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Ren
   return gain;
 }
 
-GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
-                  const Scene& scene, const RunContext& context) {
+namespace {
+
+/// log_gain of every view against the volume; where there is none, the logarithm of its light.
+struct LogGains {
+  std::vector<std::array<double, 3>> logs;
+  std::vector<char> fitted;
+};
+
+LogGains log_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
+                   const Scene& scene, const RunContext& context) {
   const LatticeStack stack(volume);
   const std::vector<std::array<float, 3>> colors = radiance_colors(volume, scene.transform, scene.exposure);
   const int views = static_cast<int>(dataset.views.size());
-  std::vector<std::array<double, 3>> logs(views);
-  std::vector<char> fitted(views, 0);
-  parallel_for(views, context.thread_count(), [&](std::int64_t v, int) {
+  LogGains gains{std::vector<std::array<double, 3>>(views), std::vector<char>(views, 0)};
+  auto& [logs, fitted] = gains;
+  parallel_for(views, context.thread_count(), [&, &logs = logs, &fitted = fitted](std::int64_t v, int) {
     context.throw_if_cancelled();
     const int view = static_cast<int>(v);
     const std::array<float, 3> before = scene.light.of_view(view);
@@ -121,22 +168,34 @@ GainFit fit_gains(const Volume& volume, const Dataset& dataset, const Photograph
     fitted[view] = gain.has_value();
     for (int c = 0; c < 3; ++c) logs[view][c] = gain ? (*gain)[c] : std::log(static_cast<double>(before[c]));
   });
+  return gains;
+}
+
+}  // namespace
+
+GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
+                  const Scene& scene, const RunContext& context, GainScale held_to) {
+  auto [logs, fitted] = log_gains(volume, dataset, load, scene, context);
+  const int views = static_cast<int>(logs.size());
+  const std::array<double, 3> scale = held_to == GainScale::kOfViews ? common_scale(logs, fitted, scene.light)
+                                                                     : std::array<double, 3>{0, 0, 0};
+  if (has_domes(scene.light)) share_gains(scene.light, logs, fitted);
   GainFit fit;
-  std::array<double, 3> mean{0, 0, 0};
-  for (int v = 0; v < views; ++v) {
-    fit.fitted_views += fitted[v];
-    for (int c = 0; c < 3; ++c) mean[c] += logs[v][c] / views;
-  }
-  fit.of_views.resize(views);
   double squares = 0;
-  for (int v = 0; v < views; ++v)
+  int gains = 0;
+  for (int v = 0; v < views; ++v) {
+    fit.of_views.push_back(scene.light.of_view(v));
+    if (has_domes(scene.light) && (!scene.light.is_gain(v) || !fitted[v])) continue;
+    fit.fitted_views += fitted[v];
+    ++gains;
     for (int c = 0; c < 3; ++c) {
-      const double gain = std::exp(logs[v][c] - mean[c]);
-      squares += (logs[v][c] - mean[c]) * (logs[v][c] - mean[c]);
+      const double log_gain = logs[v][c] - scale[c], gain = std::exp(log_gain);
+      squares += log_gain * log_gain;
       fit.of_views[v][c] = static_cast<float>(gain);
       fit.largest_change = std::max(fit.largest_change, std::abs(gain / scene.light.of_view(v)[c] - 1));
     }
-  if (views > 0) fit.spread = std::sqrt(squares / (3.0 * views));
+  }
+  if (gains > 0) fit.spread = std::sqrt(squares / (3.0 * gains));
   return fit;
 }
 

@@ -117,6 +117,66 @@ TEST(FitGains, FindsTheLightOfEveryPhotograph) {
   EXPECT_GT(share_near(dataset, load, with, gain), share_near(dataset, load, without, none) + 0.05);
 }
 
+/// The light of a view as a dome of its colour.
+NodeSky dome_of(int view) {
+  NodeSky sky;
+  sky.model = SkyModel::kUniform;
+  sky.sun_source = SunSource::kTime;
+  for (int c = 0; c < 3; ++c) sky.channels[c].scale = true_light(view)[c];
+  return sky;
+}
+
+// Two of three views have the light of their dome; the others are five times darker, and follow the volume.
+TEST(FitGains, ViewsWithoutASkyAreHeldToTheScaleOfThoseWithOne) {
+  const Dataset dataset = cube_dataset(15, 48);
+  constexpr float kDark = 0.2f;
+  const auto is_dark = [](int view) { return view % 3 == 1; };
+  const PhotographLoader load = [&, once = lit_loader(dataset)](const View& view) {
+    Photograph photo = once(view);
+    if (is_dark(static_cast<int>(&view - dataset.views.data())))
+      for (float& value : photo.rgb.data()) value *= kDark;
+    return photo;
+  };
+  Daylight daylight;
+  for (int v = 0; v < 15; ++v) {
+    daylight.skies.push_back(is_dark(v) ? NodeSky() : dome_of(v));
+    daylight.sky_of_views.push_back(v);
+    daylight.sky_masked.push_back(1);
+  }
+  const std::vector<std::array<float, 3>> known = light_of_views(daylight);
+  for (const IlluminationChoice choice : {IlluminationChoice::kSky, IlluminationChoice::kSkyNormal}) {
+    RunContext context(2);
+    ReconstructHooks hooks;
+    hooks.daylight = &daylight;
+    const Reconstruction made =
+        reconstruct(dataset, load, cube_options(choice, Matching::kCanonical), context, hooks);
+    const double scale = known[0][1] / true_light(0)[1];
+    for (int v = 0; v < 15; ++v)
+      for (int c = 0; c < 3; ++c) {
+        if (!is_dark(v)) EXPECT_EQ(made.scene.light.of_views[v][c], known[v][c]);
+        if (is_dark(v))
+          EXPECT_NEAR(std::log(made.scene.light.of_views[v][c]), std::log(kDark * true_light(v)[c] * scale),
+                      0.1)
+              << "view " << v << " channel " << c;
+      }
+    ASSERT_FALSE(made.summary.light.empty());
+    EXPECT_EQ(made.summary.light.back().fitted_views, 5);
+    ViewStageOptions stages;
+    stages.depth = false;
+    for_each_view_result(dataset, load, made, cube_options(choice, Matching::kCanonical), stages, context,
+                         [&](const ViewResult& result) {
+                           if (!is_dark(result.view_idx)) return;
+                           double photographed = 0, rendered = 0;
+                           for (std::size_t i = 0; i < result.photo.foreground.data().size(); ++i)
+                             if (result.photo.foreground.data()[i] == 255) {
+                               photographed += result.photo.rgb.data()[3 * i];
+                               rendered += result.rendering.rgb.data()[3 * i];
+                             }
+                           EXPECT_NEAR(rendered / photographed, 1, 0.25) << result.view_idx;
+                         });
+  }
+}
+
 TEST(FitGains, RendersAreInThePhotographsOwnLight) {
   const Dataset dataset = cube_dataset(14, 48);
   const PhotographLoader load = lit_loader(dataset);

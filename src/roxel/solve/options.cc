@@ -221,8 +221,12 @@ void add_background(OptionTable<Options>& table) {
             {"unknown", BackgroundChoice::kUnknown},
             {"black", BackgroundChoice::kBlack},
             {"constant", BackgroundChoice::kConstant},
-            {"mask", BackgroundChoice::kMask}})
-      .help("What a ray sees that passes every voxel")
+            {"mask", BackgroundChoice::kMask},
+            {"sky", BackgroundChoice::kSky}})
+      .help(
+          "What a ray sees that passes every voxel; sky: what the masks of skies say, those of --sky or "
+          "fitted "
+          "in this run, and anything in photographs whose sky is not known")
       .source("docs/background.md");
   table.add("background-color", &Options::background_color)
       .help("Colour of a constant background, which it implies: linear r,g,b")

@@ -14,7 +14,7 @@
 
 namespace roxel {
 
-enum class BackgroundChoice { kAuto, kNone, kUnknown, kBlack, kConstant, kMask };
+enum class BackgroundChoice { kAuto, kNone, kUnknown, kBlack, kConstant, kMask, kSky };
 enum class SurroundChoice { kAuto, kOn, kOff };
 
 struct ReconstructOptions {

@@ -152,10 +152,10 @@ void FitPixels::choose(const Dataset& dataset, const PhotographLoader& load, con
                        const SurfaceLight* surface_light, int view_idx, double apart) {
   View& view = views_[view_idx];
   const Photograph photo = load(dataset.views[view_idx]);
-  const Image light = surface_light
-                          ? light_of_pixels(stack_, *surface_light, surface_light->sky_of_view(view_idx),
-                                            view.camera, view.range, context_)
-                          : Image();
+  const bool by_sky = surface_light && surface_light->sky_of_view(view_idx) >= 0;
+  const Image light = by_sky ? light_of_pixels(stack_, *surface_light, surface_light->sky_of_view(view_idx),
+                                               view.camera, view.range, context_)
+                             : Image();
   const Rgb of_view = scene.light.of_view(view_idx);
   const auto exposure = static_cast<float>(scene.exposure);
   const int stride = stride_of(view, apart), width = view.camera.intrinsics.width;

@@ -115,7 +115,8 @@ RefineOptions refine_options(const ReconstructOptions& options) {
 /// Before a background that may have any colour, and before a camera inside the box, whatever rises first
 /// hides what is behind it: there, only falling opacities are hurried.
 Accelerate which_steps(const Scene& scene) {
-  const bool open = scene.background.kind == BackgroundKind::kUnknown || scene.seen_from_inside;
+  const bool open =
+      (scene.has_open_ends() && scene.background.kind != BackgroundKind::kNone) || scene.seen_from_inside;
   return open ? Accelerate::kFalling : Accelerate::kBoth;
 }
 
@@ -212,7 +213,7 @@ class LevelPasses {
               volume, summary);
       const bool rests = summary.passes.back().mean_opacity_change < options_.tolerance;
       if (last) return state.resting || (pass.prior.sharpness > 1 ? rested : rests);
-      if (scene.light.from == LightSource::kGain && !state.light_rests) {
+      if (scene.light.has_gains() && !state.light_rests) {
         memory_.release();
         fit_light(state, samples, scene, volume, summary);
       }
@@ -347,7 +348,7 @@ class Levels {
     made_.summary = std::move(from.summary);
     made_.scene.light.of_views = std::move(from.light);
     made_.scene.light.from = from.state.light_from;
-    if (from.state.level > 1 && hooks_.recall_skies) daylight_ = hooks_.recall_skies();
+    if (from.state.level > 1 && hooks_.recall_skies) know_skies(hooks_.recall_skies());
     seconds_before_ = made_.summary.seconds;
     made_.summary.notes.push_back("resumed after level " + std::to_string(from.state.level) + ", pass " +
                                   std::to_string(from.state.passes));
@@ -400,9 +401,12 @@ class Levels {
     const LevelSamples samples(dataset_, load_, options_, context_,
                                std::ldexp(scene.voxel_size, options_.levels - state.level));
     if (state.level == options_.levels) {
-      if (scene.light.by_normal)
+      if (scene.light.by_normal) {
         made_.surface_light = samples.paint_by_normal(scene, *daylight_, made_.volume);
-      else if (scene.light.local_matching)
+        if (scene.light.has_gains())  // of the colours as they now are, without shading
+          scene.light.of_views =
+              fit_gains(made_.volume, dataset_, load_, scene, context_, GainScale::kOfVolume).of_views;
+      } else if (scene.light.local_matching)
         samples.paint(scene, made_.volume);
       if (options_.fit_colors) fit_to_photographs();
     }
@@ -411,9 +415,7 @@ class Levels {
       if (scene.light.local_matching) samples.paint(scene, made_.volume);
       choose_gain(dataset_, load_, made_.volume, context_, state.level, scene, made_.summary);
     }
-    if (hooks_.look_at_skies_again && state.level == 1 && options_.levels > 1 &&
-        scene.light.from == LightSource::kSky)
-      look_at_skies_again();
+    if (hooks_.look_at_skies_again && state.level == 1 && options_.levels > 1) look_at_skies_again();
     LevelRecord& record = made_.summary.levels.back();
     record.seconds += seconds_since(start);
     record.peak_memory_bytes = std::max(record.peak_memory_bytes, memory.bytes());
@@ -433,8 +435,23 @@ class Levels {
   void look_at_skies_again() {
     std::optional<Daylight> again = hooks_.look_at_skies_again(made_.volume, made_.scene);
     if (!again) return;
-    daylight_ = std::move(again);
+    know_skies(std::move(*again));
+    if (made_.scene.light.from != LightSource::kSky) return;
+    const std::vector<std::array<float, 3>> before = std::move(made_.scene.light.of_views);
     made_.scene.light.of_views = light_of_views(*daylight_, options_.sky_light);
+    for (std::size_t v = 0; v < before.size(); ++v)  // gains stay until the next pass
+      if (made_.scene.light.is_gain(static_cast<int>(v))) made_.scene.light.of_views[v] = before[v];
+  }
+
+  /// Other skies than those of the survey: views may have got a dome's light or a mask.
+  void know_skies(Daylight daylight) {
+    daylight_ = std::move(daylight);
+    Scene& scene = made_.scene;
+    for (std::size_t v = 0; v < scene.light.of_dome.size(); ++v)
+      scene.light.of_dome[v] = daylight_->of_view(static_cast<int>(v)) != nullptr;
+    if (scene.light.from == LightSource::kSky) scene.light.shared = daylight_->sky_of_views;
+    for (std::size_t v = 0; v < daylight_->sky_masked.size(); ++v)
+      scene.masked[v] |= daylight_->sky_masked[v];
   }
 
   void make_topology(int level, const std::vector<SampleNode>& samples) {

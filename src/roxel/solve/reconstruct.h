@@ -30,8 +30,8 @@ struct ReconstructHooks {
   const Volume* initial = nullptr;
   /// The skies over the photographs, where they are known.
   const Daylight* daylight = nullptr;
-  /// Asked after the first of several levels, where skies are divided out: skies that are fitted again,
-  /// knowing what the volume leaves unexplained, or nothing. From then on photographs may come with other
+  /// Asked after the first of several levels: skies that are fitted again, knowing what the volume leaves
+  /// unexplained, or nothing. From then on photographs may come with other
   /// masks of the sky.
   std::function<std::optional<Daylight>(const Volume&, const Scene&)> look_at_skies_again;
   /// What that found, for a run that goes on from a later level; from then on it is as if it had been called.

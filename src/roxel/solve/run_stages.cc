@@ -86,18 +86,22 @@ class ViewStages {
                   view_range(scene_, dataset_, view_idx), render_options(), context_);
   }
 
+  bool has_surface_light(int view_idx) const {
+    return surface_light_ && surface_light_->sky_of_view(view_idx) >= 0;
+  }
+
   /// Colours that the view is rendered with: in the light on their own surface where that is known, else
   /// canonical.
   const std::vector<std::array<float, 3>>& colors_for(int view_idx,
                                                       std::vector<std::array<float, 3>>& lit) const {
-    if (!surface_light_) return colors_;
+    if (!has_surface_light(view_idx)) return colors_;
     lit = in_light_of(*surface_light_, surface_light_->sky_of_view(view_idx), colors_);
     return lit;
   }
 
   /// Canonical colours as the view's photograph shows them.
   void put_into_light_of(ViewResult& result) const {
-    if (surface_light_) {
+    if (has_surface_light(result.view_idx)) {
       const PinholeCamera& camera = dataset_.views[result.view_idx].camera;
       result.light = light_of_pixels(stack_, *surface_light_, surface_light_->sky_of_view(result.view_idx),
                                      camera, view_range(scene_, dataset_, result.view_idx), context_);

@@ -88,7 +88,8 @@ Image sample_image(const Dataset& dataset, int view_idx, const Photograph& photo
                    SampleColors colors) {
   const double focal_px = dataset.views[view_idx].camera.intrinsics.fx;
   if (colors == SampleColors::kRadiance) {
-    Image samples = canonical_image(photo, view_idx, scene.exposure, Light{});
+    const bool is_gain = scene.light.from == LightSource::kSky && scene.light.is_gain(view_idx);
+    Image samples = canonical_image(photo, view_idx, scene.exposure, is_gain ? scene.light : Light{});
     for (float& value : samples.data()) value = std::clamp(value, 0.0f, kLargestComponent);
     return samples;
   }
@@ -100,6 +101,18 @@ Image sample_image(const Dataset& dataset, int view_idx, const Photograph& photo
   return samples;
 }
 
+/// Whose light is that of their dome; the others get gains.
+void say_whose_light(const Daylight& daylight, const std::string& reasons, Scene& scene) {
+  for (std::size_t v = 0; v < daylight.sky_of_views.size(); ++v)
+    scene.light.of_dome.push_back(daylight.of_view(static_cast<int>(v)) != nullptr);
+  scene.light.shared = daylight.sky_of_views;
+  if (!scene.light.has_gains()) return scene.notes.push_back("light: that of each view's sky is divided out");
+  const auto known = std::count(scene.light.of_dome.begin(), scene.light.of_dome.end(), 1);
+  scene.warnings.push_back("light: that of the sky is divided out of " + std::to_string(known) + " of " +
+                           std::to_string(scene.light.of_dome.size()) +
+                           " views; the others have gains that follow the volume: " + reasons);
+}
+
 /// Skies that are known count unless options say otherwise; then the light changes, and colours are compared
 /// without it.
 void choose_light(const Daylight* daylight, const ReconstructOptions& options, Scene& scene) {
@@ -107,19 +120,22 @@ void choose_light(const Daylight* daylight, const ReconstructOptions& options, S
   const IlluminationChoice choice = options.illumination;
   light.by_normal = choice == IlluminationChoice::kSkyNormal;
   const bool wanted = choice == IlluminationChoice::kSky || light.by_normal;
+  const std::string reasons = daylight ? reasons_without_light(*daylight) : "";
   if (wanted || (choice == IlluminationChoice::kAuto && daylight)) {
     if (daylight) light.of_views = light_of_views(*daylight, options.sky_light);
     if (light.of_views.empty() && wanted)
       throw_invalid(light.by_normal ? "--illumination sky-normal" : "--illumination sky",
-                    "no photograph whose sky is known",
-                    "photographs that show the sky, or --illumination gain");
+                    "no photograph whose light is known" + (reasons.empty() ? "" : ": " + reasons),
+                    "photographs that show the sky, with time and place or --sun, or --illumination gain");
+    if (light.of_views.empty() && !reasons.empty())
+      scene.warnings.push_back("light: that of no photograph's sky is known: " + reasons);
   }
   light.from = !light.of_views.empty()               ? LightSource::kSky
                : choice == IlluminationChoice::kGain ? LightSource::kGain
                                                      : LightSource::kNone;
   light.local_matching = options.matching == Matching::kLocal ||
                          (options.matching == Matching::kAuto && light.from == LightSource::kSky);
-  if (light.from == LightSource::kSky) scene.notes.push_back("light: that of each view's sky is divided out");
+  if (light.from == LightSource::kSky) say_whose_light(*daylight, reasons, scene);
   if (light.by_normal) scene.notes.push_back("light: voxels are painted without shading and cast shadows");
   if (light.local_matching) scene.notes.push_back("matching: without the light of the neighbourhood");
 }
@@ -148,6 +164,12 @@ double footprint_px(const PinholeCamera& camera, const Scene& scene, double voxe
 }
 
 }  // namespace
+
+bool Scene::has_open_ends() const {
+  return background.kind == BackgroundKind::kUnknown || background.kind == BackgroundKind::kNone ||
+         (background.kind == BackgroundKind::kMask &&
+          std::find(masked.begin(), masked.end(), 0) != masked.end());
+}
 
 Scene lay_out(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options) {
   reconstruct_option_table().validate(options);
@@ -200,12 +222,11 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
   for (const auto& part : luminances) all.insert(all.end(), part.begin(), part.end());
   scene.exposure = choose_exposure(std::move(all), scene.notes);
   choose_light(daylight, options, scene);
-  choose_background(borders, options, scene);
+  choose_background(borders, options, daylight, scene);
   // A mask of the sky says nothing of rays that leave the box and do not end in the sky; a box with cameras
   // in it is the whole of what they see.
-  const bool ends_unknown = scene.background.kind == BackgroundKind::kUnknown ||
-                            scene.background.kind == BackgroundKind::kNone ||
-                            (daylight && daylight->masks && !scene.seen_from_inside);
+  const bool ends_unknown =
+      scene.has_open_ends() || (daylight && daylight->has_masks() && !scene.seen_from_inside);
   const bool surround =
       options.surround == SurroundChoice::kOn || (options.surround == SurroundChoice::kAuto && ends_unknown);
   scene.surround_count = surround ? count_surround(dataset, scene.bounds) : 0;
@@ -219,8 +240,8 @@ Scene survey(const Dataset& dataset, const PhotographLoader& load, const Reconst
 int most_passes(const Scene& scene, const ReconstructOptions& options, int level) {
   if (level == options.levels) return options.passes;
   if (options.coarse_passes > 0) return options.coarse_passes;
-  const bool of_objects =
-      scene.background.kind == BackgroundKind::kMask && scene.surround_count == 0 && !scene.seen_from_inside;
+  const bool of_objects = scene.background.kind == BackgroundKind::kMask && !scene.has_open_ends() &&
+                          scene.surround_count == 0 && !scene.seen_from_inside;
   return of_objects ? 2 * options.passes : options.passes;
 }
 

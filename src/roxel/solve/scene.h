@@ -19,9 +19,13 @@ struct Scene {
   Light light;                    ///< divided out of the photographs
   MatchModel model;
   Background background;
+  std::vector<std::uint8_t> masked;  ///< one a view, 1: its photograph has a mask of what is background
   MemoryPlan memory;
   std::vector<std::string> notes;     ///< what was chosen and why, for people
   std::vector<std::string> warnings;  ///< what is likely to be a mistake, and what to change
+
+  /// Whether rays of some view may end in anything: no background, one of any colour, or no mask.
+  bool has_open_ends() const;
 };
 
 /// Reads every image once. `daylight` where it is known, else null. Throws InvalidInput for options that do
@@ -45,7 +49,8 @@ int most_drafts(const Scene& scene, const ReconstructOptions& options, int level
 std::vector<LatticeFrame> frames_of_first_level(const Scene& scene, const ReconstructOptions& options);
 
 /// Which of a photograph's colours samples hold: those that rays and voxels are compared by, or those that
-/// voxels are painted with, or linear RGB over the exposure, whatever the light.
+/// voxels are painted with, or linear RGB over the exposure, whatever the sky's light: over their gain where
+/// views have one.
 enum class SampleColors { kMatching, kCanonical, kRadiance };
 
 /// Prepares the samples of all views for voxels of `voxel_size`. Those that scene.memory has no room for come

@@ -38,7 +38,7 @@ Daylight white_day() {
   sunny.sun_source = SunSource::kGiven;
   sunny.sun = Eigen::Vector3d(-1, 0, 1).normalized();
   sunny.sun_irradiance = Eigen::Vector3d::Constant(std::numbers::pi);
-  return {{sky, sunny}, {0, 1, -1}, false};
+  return {{sky, sunny}, {0, 1, -1}, {}};
 }
 
 class OnGroundAndWall : public testing::Test {

@@ -26,6 +26,14 @@ struct Sightings {
   std::vector<std::uint32_t> first;  ///< one a slot, and the end
   std::vector<Sighting> all;
   std::vector<Eigen::Vector3f> towards;  ///< one a slot: where it is seen from
+
+  /// Of a slot, those in a known light; where there is none, all.
+  std::vector<std::uint32_t> counted(std::uint32_t slot) const {
+    std::vector<std::uint32_t> known, others;
+    for (std::uint32_t i = first[slot]; i < first[slot + 1]; ++i)
+      (all[i].sky >= 0 ? known : others).push_back(i);
+    return known.empty() ? others : known;
+  }
 };
 
 int sky_of_node(const Dataset& dataset, const Daylight& daylight, std::size_t node) {
@@ -121,7 +129,8 @@ class Painter {
   void look_at(std::size_t place) {
     const std::uint32_t slot = light_.voxels().slots[place];
     std::vector<LitColor> seen;
-    for (std::uint32_t i = sightings_.first[slot]; i < sightings_.first[slot + 1]; ++i) {
+    const std::vector<std::uint32_t> counted = sightings_.counted(slot);
+    for (const std::uint32_t i : counted) {
       const Sighting& sighting = sightings_.all[i];
       seen.push_back(lit(sighting, light_, static_cast<std::int32_t>(place)));
       if (sighting.sky >= 0) seen.back().sunlit = marched_[index(sighting.sky, place)];
@@ -129,7 +138,7 @@ class Painter {
     const SurfaceColor color = surface_color(seen);
     for (int c = 0; c < 3; ++c) albedo_[place][c] = std::min(color.albedo[c], whitest_);
     for (std::size_t i = 0; i < seen.size(); ++i)
-      if (const int sky = sightings_.all[sightings_.first[slot] + i].sky; sky >= 0)
+      if (const int sky = sightings_.all[counted[i]].sky; sky >= 0)
         light_.set_sunlit(sky, place, color.sunlit[i]);
   }
   std::size_t index(int sky, std::size_t place) const {
@@ -156,7 +165,7 @@ Spread spread_of(const Sightings& sightings, const SurfaceLight& light, std::uin
   std::array<double, 3> mean{};
   std::array<double, 6> second{};
   double weights = 0;
-  for (std::uint32_t i = sightings.first[slot]; i < sightings.first[slot + 1]; ++i) {
+  for (const std::uint32_t i : sightings.counted(slot)) {
     const Sighting& seen = sightings.all[i];
     const Rgb by = light.of(seen.sky, slot);
     std::array<double, 3> x;
