@@ -15,6 +15,8 @@
 #include "roxel/report/measure_plots.h"
 #include "roxel/report/pictures.h"
 #include "roxel/report/section_picture.h"
+#include "run_report.h"
+#include "view_writer.h"
 
 namespace roxel::cli {
 namespace {
@@ -169,16 +171,25 @@ void check_measured(const EvalOptions& options, const RunMeasures& measures) {
                   "--truth DIR, or a run with renders");
 }
 
+/// As it is, and over the run's light.
+void add_photograph(const EvalSource& source, const View& view, ReportView& shown) {
+  const Image photo = source.input->load(view).rgb;
+  const auto add = [&](const char* caption, const Image& rgb) {
+    if (!rgb.empty())
+      shown.pictures.push_back(report_picture(
+          caption, encoded_picture(rgb, source.run.file.info.exposure, source.picture_response())));
+  };
+  add("photograph", photo);
+  add(kOverItsLight, over_light_of(source.run, source.input->dataset, view, photo));
+}
+
 /// Pictures that the run has of the views that the page shows, and the photographs where they are there.
 std::vector<ReportView> report_views_of(const EvalSource& source) {
   std::vector<ReportView> views;
   for (const int v : report_views(static_cast<int>(source.view_names.size()))) {
     const std::string& name = source.view_names[v];
     ReportView shown{name, {}, {}};
-    if (const View* view = source.view(name))
-      shown.pictures.push_back(report_picture(
-          "photograph", encoded_picture(source.input->load(*view).rgb, source.run.file.info.exposure,
-                                        source.picture_response())));
+    if (const View* view = source.view(name)) add_photograph(source, *view, shown);
     for (const char* kind : {"render", "error", "depth"})
       if (const fs::path file = view_path(source.run.path, kind, name, ".png"); fs::is_regular_file(file))
         shown.pictures.push_back(report_picture(kind, read_image(file.string(), kAsItIs).rgb));
@@ -211,6 +222,7 @@ std::string report_page(const EvalSource& source, const RunMeasures& measures) {
                         {},
                         &measures};
   content.opacities = saved_voxels(source.run.file.volume, 0, 0).opacity;
+  add_skies(source.run.path, content);
   return html_report(content);
 }
 
@@ -227,7 +239,7 @@ void remove_older_measures(const fs::path& folder) {
     remove_file(folder / name);
   for (const char* name :
        {"depth", "depth_methods", "depth_error_over_sigma", "opacity_reliability", "surfaces", "color",
-        "voxel_distances", "voxel_opacities", "images", "held_out", "light", "skies"})
+        "voxel_distances", "voxel_opacities", "sky_debris", "images", "held_out", "light", "skies"})
     for (const char* suffix : {".csv", ".svg"}) remove_file(folder / (std::string(name) + suffix));
   const auto surface_plot = [&](int number) {
     return folder / ("surface_" + std::to_string(number) + ".svg");

@@ -19,6 +19,7 @@
 #include "roxel/solve/estimate.h"
 #include "roxel/surface/depth_fusion.h"
 #include "run_options.h"
+#include "run_report.h"
 #include "run_skies.h"
 #include "view_writer.h"
 
@@ -352,6 +353,7 @@ class Run {
     for (int axis = 0; axis < 3; ++axis)
       content.sections.push_back(opacity_section(made_.volume, axis, middle[axis]));
     content.opacities = saved_voxels(made_.volume, 0, 0).opacity;
+    add_skies(results, content);
     write_text_atomically(results / "report.html", html_report(content));
     add_stage("report");
   }

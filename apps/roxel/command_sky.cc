@@ -344,6 +344,7 @@ std::vector<SkyAgain> fit_skies_again(const SkyInput& input, const SkyOptions& s
         if (!again.taken) return;
         write_sky(run, fit.sky);
         write_masks(run, fit, masks);
+        write_pictures(run, fit);
         nodes[n] = node_json(fit, again.mask_share);
       });
   return all;

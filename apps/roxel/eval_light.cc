@@ -32,20 +32,19 @@ class LightMeasurement {
     options_.stride = stride();
     places_ = shared_places(depth_views_, options_, session_.context().thread_count());
     if (places_.empty()) return {};
-    std::vector<LightMeasure> measures{
-        measure("none", [](std::size_t, std::size_t) { return Eigen::Vector3d(1, 1, 1); })};
-    if (lit_) measures.push_back(measure("run", [&](auto p, auto s) { return light_of_run(p, s); }));
-    find_true_light();
-    if (!domes_.empty())
-      measures.push_back(measure("true dome", [&](auto p, auto s) { return domes_[node_of(p, s)]; }));
-    if (!on_places_.empty())
-      measures.push_back(
-          measure("true light on the surface", [&](auto p, auto s) { return light_on_place(p, s); }));
+    find_lights();
+    find_known();
+    std::vector<LightMeasure> measures;
+    for (const NamedLight& light : lights_) measures.push_back(measure(light));
     return measures;
   }
 
  private:
   using LightOf = std::function<Eigen::Vector3d(std::size_t place, std::size_t sighting)>;
+  struct NamedLight {
+    std::string name;
+    LightOf of;  ///< 0 where it is not known
+  };
 
   void read_views() {
     const Light light = roxel::light_of_run(source_.run, source_.input->dataset);
@@ -67,6 +66,28 @@ class LightMeasurement {
       views_.push_back(std::move(read));
     }
     lit_ = light.from != LightSource::kNone;
+    by_normal_ = light.by_normal;
+  }
+
+  void find_lights() {
+    lights_ = {{"none", [](std::size_t, std::size_t) { return Eigen::Vector3d(1, 1, 1); }}};
+    if (by_normal_) lights_.push_back({"sky", [&](auto p, auto s) { return light_of_view(p, s); }});
+    if (lit_) lights_.push_back({"run", [&](auto p, auto s) { return light_of_run(p, s); }});
+    find_true_light();
+    if (!domes_.empty())
+      lights_.push_back({"true dome", [&](auto p, auto s) { return domes_[node_of(p, s)]; }});
+    if (!on_places_.empty())
+      lights_.push_back({"true light on the surface", [&](auto p, auto s) { return light_on_place(p, s); }});
+  }
+
+  /// Sightings that all lights are known in: no light is measured where another is not.
+  void find_known() {
+    known_.resize(places_.size());
+    for (std::size_t p = 0; p < places_.size(); ++p)
+      for (std::size_t s = 0; s < places_[p].sightings.size(); ++s)
+        known_[p].push_back(std::all_of(lights_.begin(), lights_.end(), [&](const NamedLight& light) {
+          return light.of(p, s).minCoeff() > 0;
+        }));
   }
 
   int stride() const {
@@ -79,10 +100,14 @@ class LightMeasurement {
   const PlaceSighting& sighting(std::size_t p, std::size_t s) const { return places_[p].sightings[s]; }
   int node_of(std::size_t p, std::size_t s) const { return depth_views_[sighting(p, s).view].node; }
 
+  Eigen::Vector3d light_of_view(std::size_t p, std::size_t s) const {
+    return Eigen::Vector3f(views_[sighting(p, s).view].view_light.data()).cast<double>();
+  }
+
   /// 0 where the run knows none.
   Eigen::Vector3d light_of_run(std::size_t p, std::size_t s) const {
     const LightView& view = views_[sighting(p, s).view];
-    if (view.light.empty()) return Eigen::Vector3f(view.view_light.data()).cast<double>();
+    if (view.light.empty()) return light_of_view(p, s);
     return mean_color(view.light, sighting(p, s)).value_or(Eigen::Vector3d::Zero());
   }
 
@@ -123,27 +148,27 @@ class LightMeasurement {
                         });
   }
 
-  /// Of the photograph over the light; none where either is not known.
+  /// Of the photograph over the light; none where that or any light is not known.
   std::optional<Eigen::Vector3d> canonical(std::size_t p, std::size_t s, const LightOf& light) const {
-    const Eigen::Vector3d by = light(p, s);
+    if (!known_[p][s]) return std::nullopt;
     const auto seen = mean_color(views_[sighting(p, s).view].photo, sighting(p, s));
-    // All lights are measured at the places that all of them know.
-    if (!seen || !(by.minCoeff() > 0) || (lit_ && !(light_of_run(p, s).minCoeff() > 0))) return std::nullopt;
-    return (seen->array() / by.array()).matrix().eval();
+    if (!seen) return std::nullopt;
+    return (seen->array() / light(p, s).array()).matrix().eval();
   }
 
-  LightMeasure measure(const std::string& name, const LightOf& light) const {
+  LightMeasure measure(const NamedLight& light) const {
     LightMeasure m;
-    m.name = name;
+    m.name = light.name;
+    m.shared_places = static_cast<std::int64_t>(places_.size());
     m.spread = color_spread(
-        depth_views_, places_, [&](std::size_t p, std::size_t s) { return canonical(p, s, light); },
+        depth_views_, places_, [&](std::size_t p, std::size_t s) { return canonical(p, s, light.of); },
         options_.least_nodes);
     std::vector<ColorPair> pairs;
     for (std::size_t p = 0; p < places_.size(); ++p)
       for (std::size_t s = 0; s < places_[p].sightings.size(); ++s) {
         const Image& albedo = views_[sighting(p, s).view].albedo;
         if (albedo.empty()) continue;
-        const auto truth = mean_color(albedo, sighting(p, s)), found = canonical(p, s, light);
+        const auto truth = mean_color(albedo, sighting(p, s)), found = canonical(p, s, light.of);
         if (!truth || !found) continue;
         ColorPair pair;
         for (int c = 0; c < 3; ++c)
@@ -157,11 +182,14 @@ class LightMeasurement {
   const EvalSource& source_;
   const TrueDepths& depths_;
   Session& session_;
-  bool lit_ = false;
+  bool lit_ = false;        ///< the run divides by a light ...
+  bool by_normal_ = false;  ///< ... that differs from pixel to pixel
   SharedPlaceOptions options_;
   std::vector<DepthView> depth_views_;
   std::vector<LightView> views_;
   std::vector<SharedPlace> places_;
+  std::vector<NamedLight> lights_;
+  std::vector<std::vector<bool>> known_;                 ///< by place and sighting
   std::vector<Eigen::Vector3d> domes_;                   ///< by node
   std::vector<std::vector<Eigen::Vector3d>> on_places_;  ///< by place and node
 };

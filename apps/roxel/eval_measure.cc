@@ -13,6 +13,7 @@
 #include "roxel/io/depth_file.h"
 #include "roxel/io/image_file.h"
 #include "roxel/io/ply_file.h"
+#include "roxel/io/sky_file.h"
 #include "roxel/io/sky_truth.h"
 #include "roxel/report/markup.h"
 #include "roxel/report/pictures.h"
@@ -25,6 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostColorPixels = 2000000;
+constexpr double kOpaqueDebris = 0.3;               ///< sky debris of at least this opacity is told apart
+constexpr std::int64_t kMostDepthPixels = 2000000;  ///< of all views, that are compared pixel by pixel
 
 /// One view as far as its files are there.
 struct MeasuredView {
@@ -35,6 +38,7 @@ struct MeasuredView {
   std::optional<ViewDepth> estimate;  ///< pixels that count alone
   std::optional<ViewDepth> sure;      ///< of these, those of small enough deviation
   std::optional<ViewDepth> refined;   ///< pixels that count of the refined depth
+  std::optional<ViewDepth> truth;     ///< where there is an estimate, too
 };
 
 std::string size_text(const Image& image) {
@@ -129,6 +133,7 @@ class Measurement {
       for (const NamedDepthAccuracy& method : view.methods) add_method(method);
       if (view.depth) out_.depth.push_back(std::move(*view.depth));
       if (view.quality) out_.images.push_back(std::move(*view.quality));
+      if (view.truth) compared_.push_back(*view.estimate), truths_.push_back(std::move(*view.truth));
       if (view.estimate) estimates_.push_back(std::move(*view.estimate));
       if (view.sure) sure_.push_back(std::move(*view.sure));
       if (view.refined) refined_.push_back(std::move(*view.refined));
@@ -178,6 +183,7 @@ class Measurement {
     }
     if (estimate && view && !estimate->depth_refined.empty())
       out.refined = countable(*estimate, estimate->depth_refined, view->camera);
+    if (out.estimate && !truth.empty()) out.truth = ViewDepth{view->camera, truth};
     if (view) out.quality = measure_render(*view, estimate ? &*estimate : nullptr, truth);
     return out;
   }
@@ -245,12 +251,17 @@ class Measurement {
     return {name, image_quality(render, shown, object), image_quality(render, shown, photo.valid)};
   }
 
-  /// What two images see. A scan (points without triangles) holds nothing else, and hides nothing.
-  void keep_seen_samples() {
-    if (samples_.empty()) return;
+  std::vector<PinholeCamera> known_cameras() const {
     std::vector<PinholeCamera> cameras;
     for (const std::string& name : source_.view_names)
       if (const View* view = source_.view(name)) cameras.push_back(view->camera);
+    return cameras;
+  }
+
+  /// What two images see. A scan (points without triangles) holds nothing else, and hides nothing.
+  void keep_seen_samples() {
+    if (samples_.empty()) return;
+    const std::vector<PinholeCamera> cameras = known_cameras();
     if (cameras.empty() || source_.surface->is_point_set()) {
       out_.notes.push_back("all of the true surface in the box counts, seen or not: " +
                            std::string(cameras.empty() ? "cameras are not known" : "it is a set of points"));
@@ -278,6 +289,7 @@ class Measurement {
       const DepthPointOptions agreeing{options_.views_agree, out_.voxel_size};
       add_points("depth points that " + std::to_string(options_.views_agree) + " views agree on",
                  one_point_a_cell(depth_points(estimates_, agreeing, threads_), cell));
+      measure_pixels();
       add_points("depth points of sigma within " + short_number(options_.sure_within) + " voxels",
                  one_point_a_cell(depth_points(sure_, {}, threads_), cell));
     }
@@ -290,20 +302,36 @@ class Measurement {
     if (source_.estimate) add_mesh(source_.estimate_name, *source_.estimate);
   }
 
+  /// The same pixels of the run's depth maps and of the true ones, a point each: as photographs weigh them.
+  void measure_pixels() {
+    if (truths_.empty()) return;
+    session_.context().throw_if_cancelled();
+    DepthPointOptions options;
+    options.stride = pixel_stride(truths_, kMostDepthPixels);
+    std::vector<Eigen::Vector3d> points = depth_points(compared_, options, threads_);
+    const std::vector<Eigen::Vector3d> truth =
+        points_in_box(depth_points(truths_, options, threads_), source_.box);
+    const std::vector<Eigen::Vector3d> inside = points_in_box(points, source_.box);
+    add_surface("depth points by pixel", inside, Mesh{std::move(points), {}}, truth);
+    out_.surfaces.back().pixel_stride = options.stride;
+  }
+
   void add_points(const std::string& name, std::vector<Eigen::Vector3d> points) {
     session_.context().throw_if_cancelled();
     const std::vector<Eigen::Vector3d> inside = points_in_box(points, source_.box);
-    add_surface(name, inside, Mesh{std::move(points), {}});
+    add_surface(name, inside, Mesh{std::move(points), {}}, seen_);
   }
 
   void add_mesh(const std::string& name, const Mesh& mesh) {
     if (mesh.is_point_set()) return add_points(name, mesh.points);
-    add_surface(name, sample_surface(mesh, {options_.samples, options_.seed, source_.box}), mesh);
+    add_surface(name, sample_surface(mesh, {options_.samples, options_.seed, source_.box}), mesh, seen_);
   }
 
-  void add_surface(const std::string& name, const std::vector<Eigen::Vector3d>& points, Mesh mesh) {
+  /// `truth`: the places of the true surface that are to be found.
+  void add_surface(const std::string& name, const std::vector<Eigen::Vector3d>& points, Mesh mesh,
+                   const std::vector<Eigen::Vector3d>& truth) {
     std::vector<double> to_truth = truth_distance_->of(points, threads_);
-    std::vector<double> to_estimate = SurfaceDistance(std::move(mesh)).of(seen_, threads_);
+    std::vector<double> to_estimate = SurfaceDistance(std::move(mesh)).of(truth, threads_);
     out_.surfaces.push_back(
         {name, surface_accuracy(std::move(to_truth), std::move(to_estimate), distances())});
   }
@@ -323,6 +351,26 @@ class Measurement {
     }
     out_.volume = volume_accuracy(inside.opacity, in_voxels(truth_distance_->of(inside.centres, threads_)),
                                   in_voxels(to_voxels.of(seen_, threads_)));
+    measure_debris(inside);
+  }
+
+  /// Towards the sky, where the run or the truth has one.
+  std::optional<Eigen::Vector3d> up() const {
+    if (fs::is_directory(source_.run.path / "sky"))
+      return read_skies(source_.run.path).front().sky_from_world.transpose() * Eigen::Vector3d::UnitZ();
+    if (has_sky_truth(*source_.truth)) return Eigen::Vector3d::UnitZ();
+    return {};
+  }
+
+  void measure_debris(const SavedVoxels& voxels) {
+    const std::optional<Eigen::Vector3d> upwards = up();
+    if (!upwards || source_.surface->is_point_set()) return;
+    session_.context().throw_if_cancelled();
+    const std::vector<SkyStand> stands =
+        sky_stands(*source_.surface, voxels.centres, known_cameras(), {*upwards, out_.voxel_size}, threads_);
+    out_.debris.push_back(sky_debris(voxels.opacity, stands, options_.opacity_threshold));
+    if (options_.opacity_threshold < kOpaqueDebris)
+      out_.debris.push_back(sky_debris(voxels.opacity, stands, kOpaqueDebris));
   }
 
   const RunRenderer& renderer() {
@@ -425,6 +473,7 @@ class Measurement {
   RunMeasures out_;
   std::vector<Eigen::Vector3d> samples_, seen_;  ///< of the true surface; those that two views see
   std::vector<ViewDepth> estimates_, sure_, refined_;
+  std::vector<ViewDepth> compared_, truths_;  ///< depth maps of the run and true ones of the same views
   SavedVoxels saved_;
   std::optional<SurfaceDistance> truth_distance_;
   std::optional<RunRenderer> renderer_;

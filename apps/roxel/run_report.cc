@@ -13,7 +13,9 @@
 #include "roxel/io/image_file.h"
 #include "roxel/report/markup.h"
 #include "roxel/report/pictures.h"
+#include "roxel/report/sky_pictures.h"
 #include "run_input.h"
+#include "view_writer.h"
 
 namespace roxel::cli {
 namespace {
@@ -47,8 +49,10 @@ ReportView view_of(const RunReportSource& source, const View& view) {
   const double white = source.run.file.info.exposure;
   const Response response = white == 1 && source.input.response ? *source.input.response : Response{};
   ReportView out{view.name, rms_text(source.summary, view.name), {}};
-  out.pictures.push_back(
-      report_picture("photograph", encoded_picture(source.input.load(view).rgb, white, response)));
+  const Image photo = source.input.load(view).rgb;
+  out.pictures.push_back(report_picture("photograph", encoded_picture(photo, white, response)));
+  if (const Image plain = over_light_of(source.run, source.input.dataset, view, photo); !plain.empty())
+    out.pictures.push_back(report_picture(kOverItsLight, encoded_picture(plain, white, response)));
   for (const char* kind : {"render", "error"})
     if (const fs::path file = newest(source.folders, kind, view.name, ".png"); !file.empty())
       out.pictures.push_back(report_picture(kind, read_image(file.string(), kAsItIs).rgb));
@@ -66,6 +70,17 @@ ReportView view_of(const RunReportSource& source, const View& view) {
 
 }  // namespace
 
+Image over_light_of(const FinishedRun& run, const Dataset& dataset, const View& view, const Image& photo) {
+  const Light light = light_of_run(run, dataset);
+  if (light.from == LightSource::kNone) return {};
+  const fs::path file = view_path(run.path, "light", view.name, ".exr");
+  const Image of_pixels = light.by_normal && fs::is_regular_file(file)
+                              ? read_image(file.string(), Response{ResponseCurve::kLinear}).rgb
+                              : Image();
+  if (!of_pixels.empty() && of_pixels.data().size() != photo.data().size()) return {};
+  return over_light(photo, of_pixels, light.of_view(static_cast<int>(&view - dataset.views.data())));
+}
+
 bool has_report(const FinishedRun& run) { return fs::is_regular_file(run.path / "report.html"); }
 
 ReportMesh mesh_pictures_of(const fs::path& run) {
@@ -80,6 +95,19 @@ ReportMesh mesh_pictures_of(const fs::path& run) {
   mesh.turntable = bytes_of(run / "mesh_turntable.jpg");
   mesh.turns = kTurns;
   return mesh;
+}
+
+void add_skies(const fs::path& results, ReportContent& content) {
+  const auto options = content.summary.value("options", nlohmann::ordered_json::object());
+  if (const auto from = options.find("sky"); from != options.end() && from->is_string()) {
+    content.skies_from = from->get<std::string>();
+    if (fs::is_regular_file(fs::path(content.skies_from) / "summary.json"))
+      content.their_skies = nlohmann::ordered_json(read_summary(content.skies_from))
+                                .value("skies", nlohmann::ordered_json::array());
+    content.skies = sky_reports_of(content.skies_from, content.their_skies);
+  } else {
+    content.skies = sky_reports_of(results, content.summary.value("skies", nlohmann::ordered_json::array()));
+  }
 }
 
 void write_run_report(const RunReportSource& source, ReportMesh mesh, const RunContext& context) {
@@ -98,6 +126,7 @@ void write_run_report(const RunReportSource& source, ReportMesh mesh, const RunC
   for (int axis = 0; axis < 3; ++axis)
     content.sections.push_back(opacity_section(volume, axis, middle[axis]));
   content.opacities = saved_voxels(volume, 0, 0).opacity;
+  add_skies(source.run.path, content);
   write_text_atomically(source.folders.results / "report.html", html_report(content));
 }
 

@@ -26,16 +26,6 @@ double share_opaque(const Image& opacity) {
   return static_cast<double>(opaque) / static_cast<double>(opacity.data().size());
 }
 
-/// The photograph without its light; black where that is not known.
-Image under_canonical_light(const ViewResult& result) {
-  Image rgb = result.photo.rgb;
-  for (std::size_t i = 0; i < rgb.data().size(); ++i) {
-    const float light = result.light.empty() ? result.view_light[i % 3] : result.light.data()[i];
-    rgb.data()[i] = light > 0 ? rgb.data()[i] / light : 0.0f;
-  }
-  return rgb;
-}
-
 /// The render's light in units of white, as image_error compares it.
 Image in_whites(const Image& light, double white) {
   Image scaled = light;
@@ -44,6 +34,14 @@ Image in_whites(const Image& light, double white) {
 }
 
 }  // namespace
+
+Image over_light(Image photo, const Image& light, const std::array<float, 3>& view_light) {
+  for (std::size_t i = 0; i < photo.data().size(); ++i) {
+    const float by = light.empty() ? view_light[i % 3] : light.data()[i];
+    photo.data()[i] = by > 0 ? photo.data()[i] / by : 0.0f;
+  }
+  return photo;
+}
 
 Mask object_mask(const Photograph& photo, const Image& opacity) {
   Mask mask(photo.rgb.width(), photo.rgb.height());
@@ -92,7 +90,8 @@ ViewWriter::Pictures ViewWriter::make_pictures(const ViewResult& result) const {
   Pictures pictures;
   pictures.photo = encoded_picture(result.photo.rgb, white_, response_);
   if (!result.light.empty() || result.view_light != std::array<float, 3>{1, 1, 1})
-    pictures.canonical = encoded_picture(under_canonical_light(result), white_, response_);
+    pictures.canonical =
+        encoded_picture(over_light(result.photo.rgb, result.light, result.view_light), white_, response_);
   if (!result.rendering.rgb.empty()) {
     pictures.render = encoded_picture(result.rendering.rgb, white_, response_);
     pictures.error =
@@ -137,12 +136,11 @@ ReportView ViewWriter::report_view(const ViewResult& result, const ViewFigures& 
                                    const Pictures& pictures) const {
   ReportView view{figures.name, {}, {report_picture("photograph", pictures.photo)}};
   if (figures.reprojection_rms) view.figures = "RMS " + short_number(*figures.reprojection_rms, 3) + " %";
+  if (!pictures.canonical.empty()) view.pictures.push_back(report_picture(kOverItsLight, pictures.canonical));
   if (!pictures.render.empty()) {
     view.pictures.push_back(report_picture("render", pictures.render));
     view.pictures.push_back(report_picture("error", pictures.error));
   }
-  if (!pictures.canonical.empty())
-    view.pictures.push_back(report_picture("under canonical light", pictures.canonical));
   const DepthMap& map = result.depth;
   if (!map.depth.empty()) {
     view.pictures.push_back(report_picture("depth", pictures.depth));

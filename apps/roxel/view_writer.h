@@ -61,6 +61,10 @@ class ViewWriter {
   std::map<int, ReportView> report_;  ///< by view, those that the page shows
 };
 
+/// The photograph without its light, of each pixel or else of the view; black where that is not known.
+Image over_light(Image photo, const Image& light, const std::array<float, 3>& view_light);
+inline constexpr const char* kOverItsLight = "photograph over its light";
+
 /// The pixels whose error counts: the foreground where the view has a mask, else those more opaque than one
 /// half; only valid ones.
 Mask object_mask(const Photograph& photo, const Image& opacity);

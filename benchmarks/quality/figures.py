@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 
+import runs
 import tables
 
 LEVELS = [1, 2, 3]                # figure 5.6: the head after each level, the last at FINEST voxels
@@ -45,7 +46,7 @@ def quiet(options, *command):
 def run_again(options, folder, done, command, sources):
     """Makes `folder` by the command, which reads `sources`, unless it is there."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    tables.make(quiet(options, *command), folder, done, sources)
+    runs.make(quiet(options, *command), folder, done, sources)
 
 
 def sheet(options, name, columns, width, files):
@@ -94,7 +95,7 @@ def depth_of(part, options):
     before = metrics_before.with_name(tables.run_name(run))
     data = tables.data_of(part, options)
     after = options.work / "figures" / (part + "-depth")
-    tables.make(quiet(options, "depth", after, *DEPTHS[part][1]), after, "summary.json", [before],
+    runs.make(quiet(options, "depth", after, *DEPTHS[part][1]), after, "summary.json", [before],
                 lambda folder: shutil.copytree(before, folder))
     if part == "mug" and not (after / "mesh_views.png").exists():
         subprocess.run(quiet(options, "mesh", after), check=True, stdout=subprocess.DEVNULL)

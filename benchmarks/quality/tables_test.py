@@ -10,6 +10,7 @@ import unittest
 import unittest.mock
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import runs  # noqa: E402
 import tables  # noqa: E402
 
 
@@ -160,7 +161,7 @@ class Runs(unittest.TestCase):
             count = pathlib.Path(name) / "count"
             script = f"mkdir {folder}; touch {folder}/done; echo x >> {count}"
             for command, made in [(script, True), (script, False), (script + " ", True)]:
-                self.assertEqual(tables.make(["sh", "-c", command], folder, "done"), made)
+                self.assertEqual(runs.make(["sh", "-c", command], folder, "done"), made)
             self.assertEqual(count.read_text(), "x\nx\n")
 
     def test_a_run_is_made_again_by_another_program(self):
@@ -169,8 +170,8 @@ class Runs(unittest.TestCase):
             for text, made in [("one", True), ("one", False), ("two", True)]:
                 program.write_text(f"#!/bin/sh\nmkdir {folder} && touch {folder}/done && echo {text} > {folder}/by\n")
                 program.chmod(0o755)
-                tables.digest.cache_clear()
-                self.assertEqual(tables.make([str(program)], folder, "done"), made)
+                runs.digest.cache_clear()
+                self.assertEqual(runs.make([str(program)], folder, "done"), made)
             self.assertEqual((folder / "by").read_text(), "two\n")
 
     def test_a_run_is_made_again_after_what_it_reads(self):
@@ -178,15 +179,15 @@ class Runs(unittest.TestCase):
             world, run = pathlib.Path(name) / "world", pathlib.Path(name) / "run"
             command = lambda folder, more="": ["sh", "-c", f"mkdir {folder} && touch {folder}/done {more}"]
             for seed, made in [("", True), ("", False), ("--seed 2", True), ("--seed 2", False)]:
-                tables.make(["sh", "-c", f"mkdir {world}; touch {world}/done; : {seed}"], world, "done")
-                self.assertEqual(tables.make(command(run), run, "done", [world]), made)
+                runs.make(["sh", "-c", f"mkdir {world}; touch {world}/done; : {seed}"], world, "done")
+                self.assertEqual(runs.make(command(run), run, "done", [world]), made)
 
     def test_a_prepared_folder_is_there_for_the_command(self):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name) / "run"
             command = ["sh", "-c", f"mv {folder}/begun {folder}/done"]
             prepare = lambda f: (f.mkdir(), (f / "begun").write_text("x"))
-            self.assertEqual([tables.make(command, folder, "done", (), prepare) for _ in range(2)], [True, False])
+            self.assertEqual([runs.make(command, folder, "done", (), prepare) for _ in range(2)], [True, False])
 
     def test_shares_are_of_the_data_sets_diagonal(self):
         with tempfile.TemporaryDirectory() as name:

@@ -127,12 +127,56 @@ class Courtyard(AccuracyCase):
     """Three of its eight nodes, at coarse voxels and without refinement: all of it, at half a metre, takes minutes."""
 
     name, bounds, diagonal = "courtyard", "-36,-32,-0.5,36,33,28", 101.04
-    options = ["--nodes", "0:3", "--voxel-size", "1", "--matching", "local", "--no-refine", "--no-mesh"]
+    options = ["--nodes", "0:3", "--voxel-size", "1", "--illumination", "sky-normal", "--matching", "local", "--no-refine", "--no-mesh"]
 
     def test_belief_propagation_costs_little_where_the_volume_errs(self):
         for volume, bp in zip(self.within("volume"), self.within("bp")):
             self.assertGreater(volume, 5)
             self.assertGreaterEqual(bp, volume - 0.5)
+
+    def test_light_brings_nodes_together_and_near_to_albedo_the_more_of_it_is_divided_out(self):
+        by = {light["light"]: light for light in self.metrics["light"]}
+        none, sky, normal = (by[name] for name in ("none", "sky", "run"))
+        self.assertGreater(normal["places"], 200)
+        self.assertEqual(len({(light["places"], light["albedo"]["pixels"]) for light in by.values()}), 1)  # all at the same places
+        for measure in (lambda light: light["mean_spread"], lambda light: light["albedo"]["mean_log_error"]):
+            self.assertGreater(measure(none), measure(sky))
+            self.assertGreater(measure(sky), measure(normal))
+
+    def test_the_sky_is_left_empty(self):
+        opaque = self.metrics["sky_debris"][0]
+        self.assertEqual(opaque["opacity_threshold"], 0.3)
+        self.assertLess(opaque["before_sky"]["share"], 0.01)
+
+
+class CourtyardSkies(Case):
+    """All eight nodes, against the true domes, suns and masks."""
+
+    @classmethod
+    def setUpClass(cls):
+        data = data_set("courtyard")
+        if data is None:
+            raise unittest.SkipTest("test data \"courtyard\" is not here; set ROXEL_TEST_DATA to its folder")
+        super().setUpClass()
+        run = cls.folder / "skies"
+        for command in (["sky", data, "-o", run, "--no-pictures", "--quiet"], ["eval", run, "--truth", data, "-o", cls.folder / "metrics", "--quiet"]):
+            done = program.run(*command, timeout=600)
+            assert done.returncode == 0, done.stderr
+        cls.skies = json.loads((cls.folder / "metrics/metrics.json").read_text())["skies"]
+
+    def test_domes_suns_and_masks(self):
+        self.assertEqual(len(self.skies), 8)
+        for sky in self.skies:
+            with self.subTest(sky["node"]):
+                self.assertLessEqual(sky["fit_error"], 0.03)
+                self.assertLessEqual(sky["dome_error"], 1.3 * sky["oracle_error"])
+                self.assertGreaterEqual(sky["mask_iou"], 0.95)
+                self.assertLessEqual(sky["sun_error_deg"], 2)
+
+    def test_suns_are_found_in_the_images_alone(self):
+        found = [sky["found_sun_error_deg"] for sky in self.skies if sky["found_sun_error_deg"] is not None]
+        self.assertGreaterEqual(len(found), 3)
+        for error in found: self.assertLessEqual(error, 2)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import sys
 import unittest
 
 import program
-from program import TINY, digest, files_below
+from program import TINY, Case, digest, files_below
 
 # A box of two units a side about the middle of the demo's world: corners, and faces as squares.
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-0.7, 1.3)]
@@ -103,7 +103,7 @@ class Measures(EvalCase):
             self.assertIn(part, text)
         found = json.loads((out / "metrics.json").read_text())
         self.assertEqual([s["name"] for s in found["surfaces"]],
-                         ["depth points", "depth points that 2 views agree on", "depth points of sigma within 4 voxels",
+                         ["depth points", "depth points that 2 views agree on", "depth points by pixel", "depth points of sigma within 4 voxels",
                           "refined depth points", "voxels"])
         self.assertTrue(0 < found["volume"]["share_within_4_voxels"] <= 1)
         self.assertTrue(0 < found["volume"]["weighted_mean_opacity"] < 1)
@@ -203,6 +203,68 @@ class Measures(EvalCase):
         every, agreed = points(1.5)[:2]
         self.assertGreater(every["points"], 100)
         self.assertEqual((agreed["points"], agreed["accuracy_90"]), (0, None))
+
+    def test_depth_points_by_pixel_are_as_the_photographs_weigh_them(self):
+        # One view of a true plane: 16 columns of truth, of which the run finds 8; its other 16 columns lie 4 voxels behind.
+        run, truth = self.folder / "by-pixel", self.folder / "true-plane"
+        shutil.copytree(self.run_folder, run)
+        shutil.rmtree(run / "depth")
+        for folder in (run / "depth", truth / "depth"): folder.mkdir(parents=True)
+        voxel = json.loads((run / "summary.json").read_text())["scene"]["voxel_size"]
+        pose = json.loads((self.data / "transforms.json").read_text())["frames"][0]["transform_matrix"]
+        right, up, back, centre = ([row[c] for row in pose[:3]] for c in range(4))
+        z = sum(c * c for c in centre) ** 0.5
+        shown = lambda x, y: 16 <= x < 48 and 12 <= y < 36
+        depth = lambda x, y: 0 if not shown(x, y) or x >= 40 else z if x < 24 else z + 4 * voxel
+        (run / "depth/000.exr").write_bytes(exr({"Z": depth, "V": lambda x, y: 0.01, "A": lambda x, y: 1}))
+        (truth / "depth/000.exr").write_bytes(exr({"Z": lambda x, y: z if shown(x, y) and x < 32 else 0}))
+        corners = [tuple(centre[i] - z * back[i] + 5 * (u * right[i] + v * up[i]) for i in range(3)) for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        (truth / "mesh.ply").write_text(ply(corners, [(0, 1, 2, 3)]))
+        found = {s["name"]: s for s in self.measures("--truth", truth, "--distances", "0.005", run=run)["surfaces"]}["depth points by pixel"]
+        self.assertEqual((found["points"], found["true_points"], found["pixel_stride"]), (24 * 24, 16 * 24, 1))
+        shares = found["within"][0]
+        for name, share in (("precision", 1 / 3), ("recall", 1 / 2), ("f_score", 2 / 5)):
+            self.assertAlmostEqual(shares[name], share, places=9)
+
+    def test_depth_points_by_pixel_need_true_depth_and_a_surface(self):
+        self.assertNotIn("depth points by pixel", [s["name"] for s in self.measures("--truth", self.mesh)["surfaces"]])
+
+    def test_sky_debris_is_what_has_nothing_above_it(self):
+        self.assertNotIn("sky_debris", self.measures("--truth", self.mesh))  # no sky: nobody says what is up
+        skies, run = self.folder / "demo-skies", self.folder / "with-skies"
+        self.succeed("sky", self.data, "-o", skies, "--up", "0,0,1", "--facets", "4", "--no-pictures", "--quiet")
+        shutil.copytree(self.run_folder, run)
+        shutil.copytree(skies / "sky", run / "sky")
+        out = self.folder / "debris"
+        self.succeed("eval", run, "--truth", self.mesh, "-o", out, "--quiet")
+        found = json.loads((out / "metrics.json").read_text())["sky_debris"]
+        self.assertEqual(len((out / "sky_debris.csv").read_text().splitlines()), 1 + len(found))
+        self.assertEqual([at["opacity_threshold"] for at in found], [0.04, 0.3])
+        head, _, body = (run / "voxels.ply").read_bytes().partition(b"end_header\n")
+        properties = re.findall(r"property (\w+) (\w+)", head.decode())
+        line = struct.Struct("<" + "".join({"float": "f", "uchar": "B"}[kind] for kind, _ in properties))
+        names = [name for _, name in properties]
+        voxel = json.loads((run / "summary.json").read_text())["scene"]["voxel_size"]
+        expected = [[0, 0, 0.0, 0.0], [0, 0, 0.0, 0.0]]
+        for values in line.iter_unpack(body):
+            x, y, z, opacity = (values[names.index(name)] for name in ("x", "y", "z", "opacity"))
+            if not (abs(x) <= 1.5 and abs(y) <= 1.5 and -1.2 <= z <= 1.8): continue
+            out_by = [max(abs(x) - 1, 0), max(abs(y) - 1, 0), max(abs(z - 0.3) - 1, 0)]
+            inside = not any(out_by)
+            away = min(1 - abs(x), 1 - abs(y), 1 - abs(z - 0.3)) if inside else sum(d * d for d in out_by) ** 0.5
+            in_the_open = away > voxel and (abs(x) > 1 or abs(y) > 1 or z > 1.3)
+            for counts, threshold in zip(expected, (0.04, 0.3)):
+                if opacity < threshold: continue
+                counts[0] += 1
+                counts[1] += in_the_open
+                counts[2] += opacity
+                counts[3] += opacity * in_the_open
+        self.assertGreater(expected[0][1], 10)
+        for at, (voxels, debris, opacity, of_debris) in zip(found, expected):
+            self.assertEqual((at["voxels"], at["in_the_open"]["voxels"]), (voxels, debris))
+            self.assertAlmostEqual(at["in_the_open"]["share"], debris / voxels, places=9)
+            self.assertAlmostEqual(at["in_the_open"]["share_of_opacity"], of_debris / opacity, places=5)
+            self.assertLessEqual(at["before_sky"]["voxels"], voxels)
 
     def test_older_measures_are_removed_and_nothing_else(self):
         full = self.held_out("full-before")
@@ -387,6 +449,84 @@ class BadTruth(EvalCase):
         small = self.folder / "small"
         self.synth(small, 4, "32x24")
         self.expect_error(2, "32 x 24 pixels, expected 64 x 48", "eval", self.run_folder, "--truth", small)
+
+
+class Daylight(Case):
+    """A street of three nodes, each with its own time; runs with reports."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.street, cls.run_folder = cls.folder / "street", cls.folder / "lit"
+        cls.small = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--no-mesh", "--no-bp", "--no-refine", "--quiet"]
+        for command in (["synth", "street", "-o", cls.street, "--images", "48", "--size", "48x38", "--samples", "1", "--quiet"],
+                        ["reconstruct", cls.street, "-o", cls.run_folder, *cls.small, "--illumination", "sky-normal"]):
+            done = program.run(*command)
+            assert done.returncode == 0, done.stderr
+
+    def captions(self, page):
+        return re.findall(r"<figcaption>([^<]*)</figcaption>", page.read_text())
+
+    def test_lights_are_measured_at_the_same_places(self):
+        found = json.loads(self.succeed("eval", self.run_folder, "--truth", self.street, "--json").stdout)["light"]
+        self.assertEqual([light["light"] for light in found], ["none", "sky", "run", "true dome", "true light on the surface"])
+        self.assertEqual(len({(light["places"], light["albedo"] and light["albedo"]["pixels"]) for light in found}), 1)
+        self.assertTrue(0 < found[0]["places"] <= found[0]["shared_places"])
+        # What the run does not know the light of is left out for every light.
+        fewer = self.folder / "fewer"
+        shutil.copytree(self.run_folder, fewer)
+        for name in sorted(os.listdir(fewer / "light"))[::2]:
+            if name.endswith(".exr"): (fewer / "light" / name).write_bytes(exr({c: lambda x, y: 0 for c in "RGB"}, 48, 38))
+        left = json.loads(self.succeed("eval", fewer, "--truth", self.street, "--json").stdout)["light"]
+        self.assertEqual(len({light["places"] for light in left}), 1)
+        self.assertLess(left[0]["places"], found[0]["places"])
+        self.assertEqual(left[0]["shared_places"], found[0]["shared_places"])
+
+    def test_a_node_without_light_has_no_errors(self):
+        dark = self.folder / "dark"
+        shutil.copytree(self.run_folder, dark)
+        sky = json.loads((dark / "sky/n00.json").read_text())
+        sky["model"] = "none"
+        (dark / "sky/n00.json").write_text(json.dumps(sky))
+        skies = json.loads(self.succeed("eval", dark, "--truth", self.street, "--json").stdout)["skies"]
+        errors = ("fit_error", "dome_error", "oracle_error", "horizontal_error", "horizontal_sky_error")
+        self.assertEqual({skies[0][error] for error in errors}, {None})
+        for error in errors: self.assertGreater(skies[1][error], 0)
+
+    def test_a_report_shows_the_skies_that_the_run_fitted(self):
+        captions = self.captions(self.run_folder / "report.html")
+        nodes = len(json.loads((self.run_folder / "summary.json").read_text())["skies"])
+        for caption in ("as the images show it", "too much contrast", "facets of the fit", "fitted sky", "error of the fit"):
+            self.assertEqual(captions.count(caption), nodes)
+        self.assertEqual(captions.count("photograph over its light"), captions.count("photograph"))
+
+    def test_pages_drawn_again_show_them_too(self):
+        def kinds(page): return {c: self.captions(page).count(c) for c in ("fitted sky", "photograph", "photograph over its light")}
+        before = kinds(self.run_folder / "report.html")
+        out = self.folder / "measured"
+        self.succeed("eval", self.run_folder, "--truth", self.street, "-o", out, "--quiet")
+        self.assertEqual(kinds(out / "report.html"), before)
+        again = self.folder / "again"
+        shutil.copytree(self.run_folder, again)
+        self.succeed("depth", again, "--no-refine", "--quiet")
+        self.assertEqual(kinds(again / "report.html"), before)
+
+    def test_skies_of_another_run_are_shown_and_named(self):
+        out = self.folder / "given"
+        self.succeed("reconstruct", self.street, "-o", out, *self.small, "--sky", self.run_folder, "--illumination", "sky")
+        page = (out / "report.html").read_text()
+        self.assertIn(f'<a href="{self.run_folder}/report.html">', page)
+        self.assertIn("fitted sky", self.captions(out / "report.html"))
+        plain = self.folder / "plain"
+        self.succeed("reconstruct", self.street, "-o", plain, *self.small, "--illumination", "none")
+        self.assertNotIn("fitted sky", self.captions(plain / "report.html"))
+        self.assertNotIn("photograph over its light", self.captions(plain / "report.html"))
+
+    def test_gains_are_shown_by_what_they_do(self):
+        out = self.folder / "gain"
+        self.succeed("reconstruct", self.street, "-o", out, *self.small, "--illumination", "gain")
+        captions = self.captions(out / "report.html")
+        self.assertGreater(captions.count("photograph over its light"), 0)
 
 
 class HeldOut(EvalCase):

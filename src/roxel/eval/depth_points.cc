@@ -1,5 +1,6 @@
 #include "roxel/eval/depth_points.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "roxel/base/parallel.h"
@@ -32,8 +33,8 @@ std::vector<Eigen::Vector3d> depth_points(const std::vector<ViewDepth>& views,
   std::vector<std::vector<Eigen::Vector3d>> of_view(views.size());
   parallel_for(static_cast<std::int64_t>(views.size()), threads, [&](std::int64_t v, int) {
     const ViewDepth& view = views[v];
-    for (int y = 0; y < view.depth.height(); ++y)
-      for (int x = 0; x < view.depth.width(); ++x) {
+    for (int y = options.stride / 2; y < view.depth.height(); y += options.stride)
+      for (int x = options.stride / 2; x < view.depth.width(); x += options.stride) {
         const float z = *view.depth.pixel(x, y);
         if (!(z > 0 && std::isfinite(z))) continue;
         const Ray ray = view.camera.ray(x + 0.5, y + 0.5);
@@ -44,6 +45,21 @@ std::vector<Eigen::Vector3d> depth_points(const std::vector<ViewDepth>& views,
   std::vector<Eigen::Vector3d> points;
   for (const auto& some : of_view) points.insert(points.end(), some.begin(), some.end());
   return points;
+}
+
+int pixel_stride(const std::vector<ViewDepth>& views, std::int64_t most) {
+  const auto counted = [](int pixels, int stride) { return (pixels - stride / 2 + stride - 1) / stride; };
+  for (int stride = 1;; ++stride) {
+    std::int64_t pixels = 0;
+    bool one_each = true;
+    for (const ViewDepth& view : views) {
+      const std::int64_t across = std::max(0, counted(view.depth.width(), stride)),
+                         down = std::max(0, counted(view.depth.height(), stride));
+      pixels += across * down;
+      one_each &= across <= 1 && down <= 1;
+    }
+    if (pixels <= most || one_each) return stride;
+  }
 }
 
 }  // namespace roxel

@@ -103,5 +103,29 @@ TEST(DepthPoints, CountWhereEnoughViewsAgree) {
   EXPECT_EQ(depth_points({a, b, c}, options, 2).size(), 3 * 99);
 }
 
+TEST(DepthPoints, AStrideCountsEveryNthPixelOfRowsAndColumns) {
+  const ViewDepth view{ten_pixels(), Image(10, 10, 1, 1.0f)};
+  DepthPointOptions options;
+  options.stride = 4;
+  const std::vector<Vector3d> points = depth_points({view, view}, options, 2);
+  ASSERT_EQ(points.size(), 2 * 4);  // rows and columns 2 and 6
+  EXPECT_NEAR((points[0] - Vector3d(-0.25, -0.25, 1)).norm(), 0, 1e-12);
+  EXPECT_NEAR((points[3] - Vector3d(0.15, 0.15, 1)).norm(), 0, 1e-12);
+}
+
+TEST(DepthPoints, TheStrideIsTheSmallestThatKeepsToTheLimit) {
+  const std::vector<ViewDepth> views(3, {ten_pixels(), Image(10, 10, 1, 1.0f)});
+  EXPECT_EQ(pixel_stride(views, 300), 1);
+  EXPECT_EQ(pixel_stride(views, 299), 2);
+  EXPECT_EQ(pixel_stride(views, 75), 2);
+  EXPECT_EQ(pixel_stride(views, 74), 3);
+  for (const std::int64_t most : {300, 100, 74, 40, 11, 3, 1}) {
+    DepthPointOptions options;
+    options.stride = pixel_stride(views, most);
+    EXPECT_LE(std::ssize(depth_points(views, options, 1)), std::max<std::int64_t>(most, 3));
+  }
+  EXPECT_EQ(pixel_stride({}, 1), 1);
+}
+
 }  // namespace
 }  // namespace roxel

@@ -4,15 +4,12 @@
 #include "roxel/surface/mesh_rays.h"
 
 namespace roxel {
-namespace {
 
 bool in_image(const PinholeCamera& camera, const Eigen::Vector3d& x) {
   const Eigen::Vector3d uvz = camera.project(x);
   return uvz.z() > 0 && uvz.x() >= 0 && uvz.x() < camera.intrinsics.width && uvz.y() >= 0 &&
          uvz.y() < camera.intrinsics.height;
 }
-
-}  // namespace
 
 std::vector<int> count_sightings(const Mesh& surface, std::span<const Eigen::Vector3d> points,
                                  std::span<const PinholeCamera> cameras, int threads) {

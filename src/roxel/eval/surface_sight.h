@@ -9,6 +9,9 @@
 
 namespace roxel {
 
+/// Whether a place is in front of the camera and falls on its image.
+bool in_image(const PinholeCamera& camera, const Eigen::Vector3d& x);
+
 /// The number of cameras that see each point: it projects into the image, and the straight line to the camera
 /// meets no triangle before the last kSightMargin of its length. Points that lie on the surface see
 /// themselves. The same for any number of threads.

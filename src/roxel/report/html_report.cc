@@ -238,10 +238,13 @@ class Page {
     for (const std::string& note : m->notes) out_ += "<p class=\"warning\">" + escape_markup(note) + "</p>\n";
     surface_table(*m);
     volume_table(*m);
+    debris_table(*m);
     depth_table(*m);
     quality_table("Images", m->images);
     quality_table("Held-out images", m->held_out);
     color_table(*m);
+    light_table(*m);
+    sky_table(*m);
     out_ += plots(measure_plots(*m));
   }
 
@@ -249,13 +252,15 @@ class Page {
     if (m.surfaces.empty()) return;
     std::vector<std::vector<std::string>> rows{
         {"surface", "points", "accuracy at 90 %", "within", "precision", "recall", "F"}};
-    for (const auto& [name, a] : m.surfaces)
+    for (const NamedSurfaceAccuracy& surface : m.surfaces) {
+      const SurfaceAccuracy& a = surface.accuracy;
       for (const DistanceShares& s : a.shares) {
         const bool first = &s == &a.shares.front();
-        rows.push_back({first ? name : "", first ? grouped(a.estimate_points) : "",
+        rows.push_back({first ? surface.title() : "", first ? grouped(a.estimate_points) : "",
                         first ? distance_text(a.accuracy_90) : "", short_number(s.distance),
                         percent(s.precision), percent(s.recall), formatted("%.4f", s.f_score)});
       }
+    }
     out_ += "<h3>Surfaces</h3>\n" + table(rows);
     out_ += "<p>Distances in world units; the box's diagonal is " + short_number(m.box_diagonal()) +
             ", a voxel " + short_number(m.voxel_size) + ". Two views see " + percent(m.surface_seen) +
@@ -270,6 +275,21 @@ class Page {
                {short_number(m.opacity_threshold), grouped(m.volume->voxels),
                 percent(m.volume->share_close(), 2), percent(m.volume->weighted_mean_opacity(), 2),
                 percent(m.volume->share_covered(), 2)}});
+  }
+
+  void debris_table(const RunMeasures& m) {
+    if (m.debris.empty()) return;
+    std::vector<std::vector<std::string>> rows{{"opacity at least", "voxels", "in the open", "of voxels",
+                                                "of opacity", "before the sky", "of voxels", "of opacity"}};
+    for (const SkyDebris& d : m.debris) {
+      rows.push_back({short_number(d.opacity_threshold), grouped(d.all.voxels)});
+      for (const VoxelSum& part : {d.in_the_open, d.before_sky}) {
+        rows.back().push_back(grouped(part.voxels));
+        rows.back().push_back(percent(d.share(part), 3));
+        rows.back().push_back(percent(d.share_of_opacity(part), 3));
+      }
+    }
+    out_ += "<h3>Sky debris</h3>\n" + table(rows);
   }
 
   void depth_table(const RunMeasures& m) {
@@ -336,6 +356,35 @@ class Page {
                     percent(m.color->median_relative)}});
   }
 
+  void light_table(const RunMeasures& m) {
+    if (m.light.empty()) return;
+    std::vector<std::vector<std::string>> rows{
+        {"photographs over", "places", "spread between nodes, mean", "median", "off albedo, mean", "median"}};
+    for (const LightMeasure& light : m.light) {
+      const bool albedo = light.albedo.pixels > 0;
+      rows.push_back({light.name, grouped(light.spread.places), formatted("%.3f", light.spread.mean),
+                      formatted("%.3f", light.spread.median),
+                      albedo ? formatted("%.3f", light.albedo.mean) : "-",
+                      albedo ? formatted("%.3f", light.albedo.median) : "-"});
+    }
+    out_ += "<h3>Light: log colour of places that several nodes see</h3>\n" + table(rows);
+  }
+
+  void sky_table(const RunMeasures& m) {
+    if (m.skies.empty()) return;
+    const auto share = [](const std::optional<double>& value) { return value ? percent(*value, 2) : "-"; };
+    const auto angle = [](const std::optional<double>& value) {
+      return value ? formatted("%.2f", *value) : "-";
+    };
+    std::vector<std::vector<std::string>> rows{{"sky", "fit", "dome", "oracle", "sun off, degrees",
+                                                "sun found, off", "light with sun", "sky alone", "mask IoU"}};
+    for (const SkyMeasure& sky : m.skies)
+      rows.push_back({sky.node, share(sky.fit_error), share(sky.dome_error), share(sky.oracle_error),
+                      angle(sky.sun_error_deg), angle(sky.found_error_deg), share(sky.horizontal_error),
+                      share(sky.horizontal_sky_error), share(sky.mask_iou)});
+    out_ += "<h3>Skies</h3>\n" + table(rows);
+  }
+
   void views() {
     if (content_.views.empty()) return;
     heading("Views");
@@ -369,15 +418,19 @@ class Page {
   }
 
   void skies() {
-    if (content_.skies.empty()) return;
+    const ordered_json& list = content_.skies_from.empty() ? at(summary_, "skies") : content_.their_skies;
+    if (content_.skies.empty() && content_.skies_from.empty()) return;
     heading("Sky");
+    if (!content_.skies_from.empty())
+      out_ += "<p>Skies, sun and sky masks of another run: <a href=\"" +
+              escape_markup(content_.skies_from + "/report.html") + "\">" +
+              escape_markup(content_.skies_from) + "</a></p>\n";
     out_ +=
         "<p>All directions down to 30 degrees below the horizon, north in the middle, east to the right. "
         "Masks show what "
         "they take out. Error of the fit: black is none, white a quarter and more, grey not used.</p>\n";
     std::vector<std::vector<std::string>> rows{{"node", "model", "error", "of the dome",
                                                 "sun (azimuth, elevation)", "from", "its light", "fallback"}};
-    const ordered_json& list = at(summary_, "skies");
     for (const auto& sky : list.is_array() ? list : ordered_json::array())
       rows.push_back({text_of(at(sky, "node")), text_of(at(sky, "model")),
                       percent(number(sky, "mean_error"), 2), percent(number(sky, "sky_share")),

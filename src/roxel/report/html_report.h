@@ -34,9 +34,11 @@ struct ReportContent {
   std::vector<ReportView> views = {};  ///< those that are shown
   ReportMesh mesh = {};                ///< no views: there is no mesh
   std::vector<Section> sections = {};
-  std::vector<float> opacities = {};      ///< of the box's voxels
-  const RunMeasures* measures = nullptr;  ///< against the truth; null: not measured
-  std::vector<ReportView> skies = {};     ///< of nodes: sphere, masks, fit, error
+  std::vector<float> opacities = {};        ///< of the box's voxels
+  const RunMeasures* measures = nullptr;    ///< against the truth; null: not measured
+  std::vector<ReportView> skies = {};       ///< of nodes: sphere, masks, fit, error
+  std::string skies_from = {};              ///< the run that they were taken from; empty: this one
+  nlohmann::ordered_json their_skies = {};  ///< "skies" of that run's summary
 };
 
 /// Everything from outside is escaped; nothing is fetched from anywhere, and there are no scripts.

@@ -86,6 +86,40 @@ TEST(HtmlReport, ShowsMeasures) {
   EXPECT_THAT(page, HasSubstr("no &lt;truth&gt;"));
 }
 
+TEST(HtmlReport, ShowsMeasuresOfLightAndSkies) {
+  ReportContent content = some_content();
+  RunMeasures measures;
+  measures.light = {{"none", 1000, {900, 1.25, 1.5}, {}}, {"run", 1000, {900, 0.5, 0.25}, {7, 0.75, 0.625}}};
+  measures.skies.resize(2);
+  measures.skies[0].node = "n00";
+  measures.skies[0].fit_error = 0.0123;
+  measures.skies[1].node = "n01";
+  SkyDebris debris;
+  debris.opacity_threshold = 0.3;
+  debris.all = {2000, 100.0}, debris.before_sky = {1, 0.5};
+  measures.debris = {debris};
+  content.measures = &measures;
+  const std::string page = html_report(content);
+  EXPECT_THAT(page, HasSubstr("<td>none</td><td>900</td><td>1.250</td><td>1.500</td><td>-</td><td>-</td>"));
+  EXPECT_THAT(page,
+              HasSubstr("<td>run</td><td>900</td><td>0.500</td><td>0.250</td><td>0.750</td><td>0.625</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>n00</td><td>1.23 %</td><td>-</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>n01</td><td>-</td><td>-</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>1</td><td>0.050 %</td><td>0.500 %</td>"));
+}
+
+TEST(HtmlReport, SaysWhereSkiesWereTakenFrom) {
+  ReportContent content = some_content();
+  EXPECT_THAT(html_report(content), Not(HasSubstr("<h2>Sky</h2>")));
+  content.skies_from = "other & run";
+  content.their_skies = {{{"node", "n07"}, {"model", "perez"}, {"mean_error", 0.5}, {"sky_share", 0.25}}};
+  content.skies = {{"n07", "", {{"fitted sky", "data:"}}}};
+  const std::string page = html_report(content);
+  EXPECT_THAT(page, HasSubstr("<a href=\"other &amp; run/report.html\">other &amp; run</a>"));
+  EXPECT_THAT(page, HasSubstr("<td>n07</td><td>perez</td><td>50.00 %</td><td>25.0 %</td>"));
+  EXPECT_THAT(page, HasSubstr("fitted sky"));
+}
+
 TEST(HtmlReport, AnEmptyEstimateHasNoAccuracy) {
   ReportContent content = some_content();
   RunMeasures measures;

@@ -13,6 +13,7 @@ nlohmann::ordered_json to_json(const std::vector<LightMeasure>& light) {
                 {"mean_log_error", m.albedo.mean},
                 {"median_log_error", m.albedo.median}};
     list.push_back({{"light", m.name},
+                    {"shared_places", m.shared_places},
                     {"places", m.spread.places},
                     {"mean_spread", m.spread.mean},
                     {"median_spread", m.spread.median},
@@ -23,22 +24,26 @@ nlohmann::ordered_json to_json(const std::vector<LightMeasure>& light) {
 
 std::string csv_table(const std::vector<LightMeasure>& light) {
   std::string csv =
-      "light,places,mean_spread,median_spread,albedo_pixels,mean_albedo_error,median_albedo_error\n";
+      "light,shared_places,places,mean_spread,median_spread,albedo_pixels,mean_albedo_error,median_albedo_"
+      "error\n";
   for (const LightMeasure& m : light)
-    csv += formatted("%s,%lld,%.6g,%.6g,%lld,%.6g,%.6g\n", m.name.c_str(),
-                     static_cast<long long>(m.spread.places), m.spread.mean, m.spread.median,
-                     static_cast<long long>(m.albedo.pixels), m.albedo.mean, m.albedo.median);
+    csv += formatted("%s,%lld,%lld,%.6g,%.6g,%lld,%.6g,%.6g\n", m.name.c_str(),
+                     static_cast<long long>(m.shared_places), static_cast<long long>(m.spread.places),
+                     m.spread.mean, m.spread.median, static_cast<long long>(m.albedo.pixels), m.albedo.mean,
+                     m.albedo.median);
   return csv;
 }
 
 std::string to_text(const std::vector<LightMeasure>& light) {
   if (light.empty()) return "";
   std::string text =
-      "| photographs over | places | log colour: spread between nodes, mean | median | off albedo, mean | "
+      "| photographs over | places of those shared | log colour: spread between nodes, mean | median | off "
+      "albedo, mean | "
       "median |\n"
       "|---|---:|---:|---:|---:|---:|\n";
   for (const LightMeasure& m : light) {
-    text += formatted("| %s | %lld | %.3f | %.3f |", m.name.c_str(), static_cast<long long>(m.spread.places),
+    text += formatted("| %s | %lld of %lld | %.3f | %.3f |", m.name.c_str(),
+                      static_cast<long long>(m.spread.places), static_cast<long long>(m.shared_places),
                       m.spread.mean, m.spread.median);
     text += m.albedo.pixels > 0 ? formatted(" %.3f | %.3f |\n", m.albedo.mean, m.albedo.median)
                                 : std::string(" - | - |\n");

@@ -11,7 +11,8 @@ namespace roxel {
 
 /// The photographs divided by one kind of light.
 struct LightMeasure {
-  std::string name;  ///< "photographs", "the run's light", ...
+  std::string name;                ///< "none", "sky", "run", "true dome", "true light on the surface"
+  std::int64_t shared_places = 0;  ///< that enough nodes see; of them spread.places have every light
   ColorSpread spread;
   LogError albedo;  ///< no pixels where the true albedo is not known
 };

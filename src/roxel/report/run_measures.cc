@@ -89,14 +89,17 @@ ordered_json surface_json(const NamedSurfaceAccuracy& surface) {
   for (const DistanceShares& s : a.shares)
     at.push_back(
         {{"distance", s.distance}, {"precision", s.precision}, {"recall", s.recall}, {"f_score", s.f_score}});
-  return {{"name", surface.name},
-          {"points", a.estimate_points},
-          {"accuracy_90", finite(a.accuracy_90)},
-          {"mean_to_truth", finite(a.mean_to_truth)},
-          {"median_to_truth", finite(a.median_to_truth)},
-          {"mean_to_estimate", finite(a.mean_to_estimate)},
-          {"median_to_estimate", finite(a.median_to_estimate)},
-          {"within", at}};
+  ordered_json json{{"name", surface.name},
+                    {"points", a.estimate_points},
+                    {"true_points", a.truth_points},
+                    {"accuracy_90", finite(a.accuracy_90)},
+                    {"mean_to_truth", finite(a.mean_to_truth)},
+                    {"median_to_truth", finite(a.median_to_truth)},
+                    {"mean_to_estimate", finite(a.mean_to_estimate)},
+                    {"median_to_estimate", finite(a.median_to_estimate)},
+                    {"within", at}};
+  if (surface.pixel_stride > 0) json["pixel_stride"] = surface.pixel_stride;
+  return json;
 }
 
 ordered_json volume_json(const RunMeasures& measures) {
@@ -116,6 +119,21 @@ ordered_json volume_json(const RunMeasures& measures) {
            {{"bin_voxels", DistanceHistogram::kBinVoxels},
             {"voxels", a.histogram.voxels},
             {"mean_opacity", mean_opacity}}}};
+}
+
+ordered_json debris_json(const RunMeasures& measures) {
+  ordered_json list = ordered_json::array();
+  for (const SkyDebris& d : measures.debris) {
+    const auto part = [&](const VoxelSum& sum) {
+      return ordered_json{
+          {"voxels", sum.voxels}, {"share", d.share(sum)}, {"share_of_opacity", d.share_of_opacity(sum)}};
+    };
+    list.push_back({{"opacity_threshold", d.opacity_threshold},
+                    {"voxels", d.all.voxels},
+                    {"in_the_open", part(d.in_the_open)},
+                    {"before_sky", part(d.before_sky)}});
+  }
+  return list;
 }
 
 ordered_json quality_json(const ImageQuality& q) {
@@ -185,7 +203,7 @@ std::string color_csv(const ColorAccuracy& color) {
 std::string surfaces_csv(const std::vector<NamedSurfaceAccuracy>& surfaces) {
   std::string csv =
       "estimate,points,accuracy_90,mean_to_truth,mean_to_estimate,distance,precision,recall,f_score\n";
-  for (const auto& [name, a] : surfaces)
+  for (const auto& [name, a, stride] : surfaces)
     for (const DistanceShares& s : a.shares)
       csv += cell(name) + formatted(",%lld,", static_cast<long long>(a.estimate_points)) +
              distance_text(a.accuracy_90, 6) + "," + distance_text(a.mean_to_truth, 6) + "," +
@@ -201,6 +219,20 @@ std::string histogram_csv(const DistanceHistogram& histogram) {
     const std::string to = bin < DistanceHistogram::kBins ? key(from + DistanceHistogram::kBinVoxels) : "";
     csv += formatted("%g,%s,%lld,%.6g\n", from, to.c_str(), static_cast<long long>(histogram.voxels[bin]),
                      histogram.mean_opacity(bin));
+  }
+  return csv;
+}
+
+std::string debris_csv(const std::vector<SkyDebris>& debris) {
+  std::string csv =
+      "opacity_threshold,voxels,in_the_open,in_the_open_share,in_the_open_share_of_opacity,before_sky,"
+      "before_sky_share,before_sky_share_of_opacity\n";
+  for (const SkyDebris& d : debris) {
+    csv += formatted("%g,%lld", d.opacity_threshold, static_cast<long long>(d.all.voxels));
+    for (const VoxelSum& part : {d.in_the_open, d.before_sky})
+      csv += formatted(",%lld,%.6g,%.6g", static_cast<long long>(part.voxels), d.share(part),
+                       d.share_of_opacity(part));
+    csv += "\n";
   }
   return csv;
 }
@@ -258,15 +290,18 @@ std::string surfaces_text(const RunMeasures& measures) {
   std::string head =
       "| surface | points | accuracy 90 % | within | precision % | recall % | F "
       "|\n|---|---:|---:|---:|---:|---:|---:|\n";
-  for (const auto& [name, a] : measures.surfaces)
+  for (const NamedSurfaceAccuracy& surface : measures.surfaces) {
+    const SurfaceAccuracy& a = surface.accuracy;
     for (std::size_t i = 0; i < a.shares.size(); ++i) {
       const DistanceShares& s = a.shares[i];
-      head += i == 0 ? formatted("| %s | %lld | %s", name.c_str(), static_cast<long long>(a.estimate_points),
+      head += i == 0 ? formatted("| %s | %lld | %s", surface.title().c_str(),
+                                 static_cast<long long>(a.estimate_points),
                                  distance_text(a.accuracy_90, 4).c_str())
                      : std::string("| | | ");
       head += formatted(" | %.4g | %.2f | %.2f | %.4f |\n", s.distance, 100 * s.precision, 100 * s.recall,
                         s.f_score);
     }
+  }
   return head + "\n";
 }
 
@@ -279,6 +314,21 @@ std::string volume_text(const RunMeasures& measures) {
       "| %lld | %.2f | %.2f | %.2f |\n\n",
       measures.opacity_threshold, static_cast<long long>(a.voxels), 100 * a.share_close(),
       100 * a.weighted_mean_opacity(), 100 * a.share_covered());
+}
+
+std::string debris_text(const RunMeasures& measures) {
+  if (measures.debris.empty()) return "";
+  std::string text =
+      "| sky debris: voxels of opacity | voxels | in the open | % | of opacity % | before the sky | % | of "
+      "opacity % |\n|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  for (const SkyDebris& d : measures.debris) {
+    text += formatted("| >= %g | %lld", d.opacity_threshold, static_cast<long long>(d.all.voxels));
+    for (const VoxelSum& part : {d.in_the_open, d.before_sky})
+      text += formatted(" | %lld | %.3f | %.3f", static_cast<long long>(part.voxels), 100 * d.share(part),
+                        100 * d.share_of_opacity(part));
+    text += " |\n";
+  }
+  return text + "\n";
 }
 
 std::string calibration_text(const RunMeasures& measures) {
@@ -303,6 +353,10 @@ std::string color_text(const std::optional<ColorAccuracy>& color) {
 }
 
 }  // namespace
+
+std::string NamedSurfaceAccuracy::title() const {
+  return pixel_stride > 1 ? name + ", 1 in " + std::to_string(pixel_stride * pixel_stride) : name;
+}
 
 bool RunMeasures::empty() const {
   return depth.empty() && reprojection.empty() && surfaces.empty() && !volume && images.empty() &&
@@ -344,6 +398,7 @@ ordered_json to_json(const RunMeasures& measures) {
   for (const NamedSurfaceAccuracy& surface : measures.surfaces)
     json["surfaces"].push_back(surface_json(surface));
   json["volume"] = volume_json(measures);
+  if (!measures.debris.empty()) json["sky_debris"] = debris_json(measures);
   json["images"] = quality_json(measures.images);
   json["held_out"] = quality_json(measures.held_out);
   json["color"] = color_json(measures.color);
@@ -371,6 +426,7 @@ std::vector<std::pair<std::string, std::string>> csv_tables(const RunMeasures& m
     tables.emplace_back("opacity_reliability.csv", reliability_csv(*measures.opacity_reliability));
   if (!measures.surfaces.empty()) tables.emplace_back("surfaces.csv", surfaces_csv(measures.surfaces));
   if (measures.volume) tables.emplace_back("voxel_distances.csv", histogram_csv(measures.volume->histogram));
+  if (!measures.debris.empty()) tables.emplace_back("sky_debris.csv", debris_csv(measures.debris));
   if (!measures.images.empty()) tables.emplace_back("images.csv", quality_csv(measures.images));
   if (!measures.held_out.empty()) tables.emplace_back("held_out.csv", quality_csv(measures.held_out));
   if (measures.color) tables.emplace_back("color.csv", color_csv(*measures.color));
@@ -383,9 +439,10 @@ std::string to_text(const RunMeasures& measures, std::size_t most_views) {
   std::string text;
   if (!measures.depth.empty()) text += depth_accuracy_table(measures.depth, most_views) + "\n";
   if (!measures.depth_methods.empty()) text += depth_methods_table(measures.depth_methods) + "\n";
-  text += surfaces_text(measures) + volume_text(measures) + quality_text("images", measures.images) +
-          quality_text("held-out images", measures.held_out) + calibration_text(measures) +
-          color_text(measures.color) + to_text(measures.light) + to_text(measures.skies);
+  text += surfaces_text(measures) + volume_text(measures) + debris_text(measures) +
+          quality_text("images", measures.images) + quality_text("held-out images", measures.held_out) +
+          calibration_text(measures) + color_text(measures.color) + to_text(measures.light) +
+          to_text(measures.skies);
   if (measures.reprojection_rms_percent)
     text += formatted("reprojection error %.2f %% of full scale\n", *measures.reprojection_rms_percent);
   for (const std::string& note : measures.notes) text += "note: " + note + "\n";

@@ -13,6 +13,7 @@
 #include "roxel/eval/image_quality.h"
 #include "roxel/eval/reliability.h"
 #include "roxel/eval/section.h"
+#include "roxel/eval/sky_debris.h"
 #include "roxel/eval/surface_accuracy.h"
 #include "roxel/eval/volume_accuracy.h"
 #include "roxel/report/light_measures.h"
@@ -21,8 +22,13 @@
 namespace roxel {
 
 struct NamedSurfaceAccuracy {
-  std::string name;  ///< what was measured: "depth points", "voxels", "estimate"
+  std::string name;  ///< what was measured: "depth points", "voxels", the estimate's file
   SurfaceAccuracy accuracy;
+  int pixel_stride =
+      0;  ///< of depth points by pixel: between those of rows and of columns that count; else 0
+
+  /// With the share of pixels, where not all count: "depth points by pixel, 1 in 9".
+  std::string title() const;
 };
 
 struct NamedImageQuality {
@@ -51,6 +57,7 @@ struct RunMeasures {
   std::optional<VolumeAccuracy> volume;
   double opacity_threshold = 0;     ///< of the voxels that count in `volume`
   double confidence_threshold = 0;  ///< of the same voxels
+  std::vector<SkyDebris> debris;    ///< of the same voxels, and of opaquer ones; empty: no skies
   std::vector<NamedImageQuality> images;
   std::vector<NamedImageQuality> held_out;  ///< views that the run has not seen
   std::optional<ColorAccuracy> color;

@@ -123,6 +123,45 @@ TEST(RunMeasures, AnEmptyEstimateHasNoDistances) {
   EXPECT_THAT(csv_tables(m)[0].second, HasSubstr("\npoints,0,-,-,-,0.5,0,0,0\n"));
 }
 
+TEST(RunMeasures, ASetOfPixelsSaysHowManyCount) {
+  RunMeasures m;
+  m.surfaces = {{"pixels", surface_accuracy({0, 1}, {0}, {0.5}), 3},
+                {"points", surface_accuracy({0}, {0}, {0.5})}};
+  const auto json = to_json(m)["surfaces"];
+  EXPECT_EQ(json[0]["name"], "pixels");
+  EXPECT_EQ(json[0]["pixel_stride"], 3);
+  EXPECT_EQ(json[0]["true_points"], 1);
+  EXPECT_FALSE(json[1].contains("pixel_stride"));
+  EXPECT_THAT(to_text(m), HasSubstr("| pixels, 1 in 9 | 2 |"));
+}
+
+TEST(RunMeasures, SkyDebrisIsThereWhereItWasMeasured) {
+  RunMeasures m;
+  EXPECT_FALSE(to_json(m).contains("sky_debris"));
+  SkyDebris debris;
+  debris.opacity_threshold = 0.04;
+  debris.all = {400, 100.0}, debris.in_the_open = {100, 10.0}, debris.before_sky = {1, 0.5};
+  m.debris = {debris};
+  const auto json = to_json(m)["sky_debris"][0];
+  EXPECT_EQ(json["in_the_open"]["share"], 0.25);
+  EXPECT_EQ(json["before_sky"]["voxels"], 1);
+  EXPECT_EQ(json["before_sky"]["share_of_opacity"], 0.005);
+  EXPECT_THAT(to_text(m), HasSubstr("| >= 0.04 | 400 | 100 | 25.000 | 10.000 | 1 | 0.250 | 0.500 |"));
+  EXPECT_THAT(csv_tables(m)[0].second, HasSubstr("\n0.04,400,100,0.25,0.1,1,0.0025,0.005\n"));
+}
+
+TEST(RunMeasures, ANodeWithoutLightHasNoErrors) {
+  RunMeasures m;
+  m.skies.resize(1);
+  m.skies[0].node = "n00";
+  m.skies[0].model = m.skies[0].sun_light = "none";
+  const auto json = to_json(m)["skies"][0];
+  for (const char* key : {"fit_error", "dome_error", "horizontal_error", "horizontal_sky_error"})
+    EXPECT_TRUE(json[key].is_null()) << key;
+  EXPECT_THAT(csv_tables(m)[0].second, HasSubstr("\nn00,none,-,-,-,-,-,none,-,-,-,0\n"));
+  EXPECT_THAT(to_text(m), Not(HasSubstr("0.00")));
+}
+
 TEST(ConvergencePlots, WhatIsNoNumberIsAGap) {
   const nlohmann::ordered_json pass{{"level", 1}, {"mean_log_likelihood", -3.0}, {"active_voxels", 9}};
   nlohmann::ordered_json broken = pass;

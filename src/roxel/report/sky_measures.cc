@@ -55,12 +55,12 @@ SkyMeasure measure_sky(const fs::path& run, const fs::path& folder, const NodeSk
   SkyMeasure m;
   m.node = sky.name;
   m.model = to_string(sky.model);
-  m.fit_error = sky.mean_error;
   m.sun_light = to_string(sky.sun_light);
   if (sky.sun_source != SunSource::kNone) m.sun_error_deg = angle_between_deg(sky.sun, truth.sun);
   if (truth.disc && sky.sun_by_images) m.found_error_deg = angle_between_deg(*sky.sun_by_images, truth.sun);
   measure_masks(run, folder, sky, m);
   if (!sky.has_light()) return m;
+  m.fit_error = sky.mean_error;
   const Image map = truth.map();
   m.dome_error = dome_error(sky_map(sky, Disc::kWithout, map.width(), map.height()), map);
   m.oracle_error = oracle_dome_error(map, truth.sun, freedom_of(sky));
@@ -102,14 +102,14 @@ ordered_json to_json(const std::vector<SkyMeasure>& skies) {
   for (const SkyMeasure& m : skies)
     list.push_back({{"node", m.node},
                     {"model", m.model},
-                    {"fit_error", m.fit_error},
+                    {"fit_error", optional_json(m.fit_error)},
                     {"dome_error", optional_json(m.dome_error)},
                     {"oracle_error", optional_json(m.oracle_error)},
                     {"sun_error_deg", optional_json(m.sun_error_deg)},
                     {"found_sun_error_deg", optional_json(m.found_error_deg)},
                     {"sun_light", m.sun_light},
-                    {"horizontal_error", m.horizontal_error},
-                    {"horizontal_sky_error", m.horizontal_sky_error},
+                    {"horizontal_error", optional_json(m.horizontal_error)},
+                    {"horizontal_sky_error", optional_json(m.horizontal_sky_error)},
                     {"mask_iou", optional_json(m.mask_iou)},
                     {"masks", m.masks}});
   return list;
@@ -121,10 +121,11 @@ std::string csv_table(const std::vector<SkyMeasure>& skies) {
       "error,"
       "horizontal_sky_error,mask_iou,masks\n";
   for (const SkyMeasure& m : skies)
-    out += formatted("%s,%s,%.6g,%s,%s,%s,%s,%s,%.6g,%.6g,%s,%d\n", m.node.c_str(), m.model.c_str(),
-                     m.fit_error, number(m.dome_error, 6).c_str(), number(m.oracle_error, 6).c_str(),
-                     number(m.sun_error_deg, 4).c_str(), number(m.found_error_deg, 4).c_str(),
-                     m.sun_light.c_str(), m.horizontal_error, m.horizontal_sky_error,
+    out += formatted("%s,%s,%s,%s,%s,%s,%s,%s,%s,%s,%s,%d\n", m.node.c_str(), m.model.c_str(),
+                     number(m.fit_error, 6).c_str(), number(m.dome_error, 6).c_str(),
+                     number(m.oracle_error, 6).c_str(), number(m.sun_error_deg, 4).c_str(),
+                     number(m.found_error_deg, 4).c_str(), m.sun_light.c_str(),
+                     number(m.horizontal_error, 6).c_str(), number(m.horizontal_sky_error, 6).c_str(),
                      number(m.mask_iou, 5).c_str(), m.masks);
   return out;
 }
@@ -135,10 +136,11 @@ std::string to_text(const std::vector<SkyMeasure>& skies) {
       "sky      fit %  dome %  oracle %  sun deg  found deg  light with sun %  sky alone %  sun's light  "
       "mask IoU\n";
   for (const SkyMeasure& m : skies)
-    out += formatted("  %-6s %5.2f  %6s  %8s  %7s  %9s  %16.2f  %11.2f  %-11s  %8s\n", m.node.c_str(),
-                     100 * m.fit_error, percent(m.dome_error).c_str(), percent(m.oracle_error).c_str(),
-                     number(m.sun_error_deg, 2).c_str(), number(m.found_error_deg, 2).c_str(),
-                     100 * m.horizontal_error, 100 * m.horizontal_sky_error, m.sun_light.c_str(),
+    out += formatted("  %-6s %5s  %6s  %8s  %7s  %9s  %16s  %11s  %-11s  %8s\n", m.node.c_str(),
+                     percent(m.fit_error).c_str(), percent(m.dome_error).c_str(),
+                     percent(m.oracle_error).c_str(), number(m.sun_error_deg, 2).c_str(),
+                     number(m.found_error_deg, 2).c_str(), percent(m.horizontal_error).c_str(),
+                     percent(m.horizontal_sky_error).c_str(), m.sun_light.c_str(),
                      number(m.mask_iou, 4).c_str());
   return out;
 }

@@ -13,15 +13,16 @@ namespace roxel {
 /// One node. What does not apply, or could not be measured, is empty.
 struct SkyMeasure {
   std::string node, model;
-  double fit_error = 0;                   ///< over the facets that the fit used
+  std::optional<double> fit_error;        ///< over the facets that the fit used
   std::optional<double> dome_error;       ///< over the true dome without the disc
   std::optional<double> oracle_error;     ///< of the same model fitted to the true dome
   std::optional<double> sun_error_deg;    ///< of the direction that is used
   std::optional<double> found_error_deg;  ///< of the direction found in the images, where the sun shines
   std::string sun_light;                  ///< none, measured, estimated
-  double horizontal_error = 0;      ///< of irradiance on the horizontal with the disc, mean over channels
-  double horizontal_sky_error = 0;  ///< and without
-  std::optional<double> mask_iou;   ///< of all images of the node that have a true mask
+  std::optional<double>
+      horizontal_error;  ///< of irradiance on the horizontal with the disc, mean over channels
+  std::optional<double> horizontal_sky_error;  ///< and without
+  std::optional<double> mask_iou;              ///< of all images of the node that have a true mask
   int masks = 0;
 };
 

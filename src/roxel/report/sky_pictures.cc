@@ -3,12 +3,30 @@
 #include <algorithm>
 #include <cmath>
 
+#include "roxel/io/image_file.h"
+#include "roxel/io/sky_file.h"
 #include "roxel/report/pictures.h"
 
 namespace roxel {
 namespace {
 
 constexpr float kUnseen = 0.15f, kNotUsed = 0.35f;
+
+constexpr std::pair<const char*, const char*> kCaptions[] = {
+    {"seen", "as the images show it"}, {"variance", "too much contrast"},
+    {"red_blue", "not blue"},          {"luminance", "dark"},
+    {"used", "facets of the fit"},     {"fit", "fitted sky"},
+    {"error", "error of the fit"}};
+
+std::string caption_of(const std::string& name, bool left_out) {
+  for (const auto& [known, caption] : kCaptions)
+    if (known == name) return std::string(caption) + (left_out ? " (left out)" : "");
+  return name;
+}
+
+SkyPanel panel_of(const std::string& name, Image picture, bool left_out = false) {
+  return {name, caption_of(name, left_out), std::move(picture)};
+}
 
 /// Radiance shown as white: little above what most of the sky has.
 double white_of(const SkyFit& fit) {
@@ -62,14 +80,13 @@ class Panels {
 
   std::vector<SkyPanel> take() {
     const SkyMasks& m = fit_.masks;
-    return {
-        {"seen", "as the images show it", picture([&](int f, const auto&) { return seen(f); })},
-        masked("variance", "too much contrast", m.variance, {1, 0.1f, 0.1f}),
-        masked("red_blue", m.red_blue_used ? "not blue" : "not blue (left out)", m.red_blue, {1, 0.9f, 0.1f}),
-        masked("luminance", m.luminance_used ? "dark" : "dark (left out)", m.luminance, {0.1f, 0.9f, 0.2f}),
-        masked("used", "facets of the fit", fit_.used, {0.1f, 0.4f, 1}),
-        {"fit", "fitted sky", picture([&](int, const auto& d) { return fitted(d); })},
-        {"error", "error of the fit", picture([&](int f, const auto&) { return error(f); })}};
+    return {panel_of("seen", picture([&](int f, const auto&) { return seen(f); })),
+            masked("variance", m.variance, {1, 0.1f, 0.1f}),
+            masked("red_blue", m.red_blue, {1, 0.9f, 0.1f}, !m.red_blue_used),
+            masked("luminance", m.luminance, {0.1f, 0.9f, 0.2f}, !m.luminance_used),
+            masked("used", fit_.used, {0.1f, 0.4f, 1}),
+            panel_of("fit", picture([&](int, const auto& d) { return fitted(d); })),
+            panel_of("error", picture([&](int f, const auto&) { return error(f); }))};
   }
 
  private:
@@ -84,12 +101,13 @@ class Panels {
     return facet.weight > 0 ? shown(facet.mean, white_) : grey(kUnseen);
   }
 
-  SkyPanel masked(const char* name, const char* caption, const std::vector<std::uint8_t>& mask,
-                  const Eigen::Vector3f& color) const {
-    return {name, caption, picture([&](int f, const auto& direction) -> Eigen::Vector3f {
-              const bool shows = mask[f] && direction.z() > 0 && fit_.light.facets[f].pictures > 0;
-              return shows ? Eigen::Vector3f(0.45f * seen(f) + 0.55f * color) : seen(f);
-            })};
+  SkyPanel masked(const char* name, const std::vector<std::uint8_t>& mask, const Eigen::Vector3f& color,
+                  bool left_out = false) const {
+    return panel_of(name, picture([&](int f, const auto& direction) -> Eigen::Vector3f {
+                      const bool shows = mask[f] && direction.z() > 0 && fit_.light.facets[f].pictures > 0;
+                      return shows ? Eigen::Vector3f(0.45f * seen(f) + 0.55f * color) : seen(f);
+                    }),
+                    left_out);
   }
 
   Eigen::Vector3f fitted(const Eigen::Vector3d& direction) const {
@@ -117,6 +135,25 @@ ReportView sky_report(const SkyFit& fit, const std::vector<SkyPanel>& panels) {
   ReportView view{fit.sky.name, fit.masks.reason};
   for (const SkyPanel& panel : panels) view.pictures.push_back(report_picture(panel.caption, panel.picture));
   return view;
+}
+
+std::vector<ReportView> sky_reports_of(const std::filesystem::path& run,
+                                       const nlohmann::ordered_json& skies) {
+  std::vector<ReportView> views;
+  if (!skies.is_array()) return views;
+  for (const int n : report_views(static_cast<int>(skies.size()))) {
+    const std::string node = skies[n].value("node", "");
+    const nlohmann::ordered_json masks = skies[n].value("masks", nlohmann::ordered_json::object());
+    ReportView view{node, masks.value("reason", "")};
+    for (const auto& [name, caption] : kCaptions)
+      if (const auto file = sky_path(run, node, std::string("_") + name + ".png");
+          std::filesystem::is_regular_file(file))
+        view.pictures.push_back(
+            report_picture(caption_of(name, masks.value(name, "") == "left out"),
+                           read_image(file.string(), Response{ResponseCurve::kLinear}).rgb));
+    if (!view.pictures.empty()) views.push_back(std::move(view));
+  }
+  return views;
 }
 
 }  // namespace roxel

@@ -3,6 +3,8 @@
 /// All directions from the zenith down to 30 degrees below the horizon; north in the middle, east to the
 /// right.
 
+#include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -28,5 +30,9 @@ std::vector<SkyPanel> sky_panels(const SkyFit& fit, int width = 480);
 
 /// Those pictures for the page, with the reason for the choice of masks.
 ReportView sky_report(const SkyFit& fit, const std::vector<SkyPanel>& panels);
+
+/// The same from the files RUN/sky/NODE_NAME.png of the nodes in a summary's "skies"; more nodes than a page
+/// shows are thinned out, those without pictures left out.
+std::vector<ReportView> sky_reports_of(const std::filesystem::path& run, const nlohmann::ordered_json& skies);
 
 }  // namespace roxel
