@@ -8,7 +8,8 @@
 namespace roxel {
 namespace {
 
-constexpr float kUnseen = 0.15f, kNotUsed = 0.35f;
+constexpr float kUnseen = 0.15f, kNoError = 0.35f;
+constexpr float kDimmed = 0.5f;  ///< heat of facets that the fit did not use
 
 /// Radiance shown as white: little above what most of the sky has.
 double white_of(const SkyFit& fit) {
@@ -69,7 +70,8 @@ class Panels {
         masked("luminance", m.luminance_used ? "dark" : "dark (left out)", m.luminance, {0.1f, 0.9f, 0.2f}),
         masked("used", "facets of the fit", fit_.used, {0.1f, 0.4f, 1}),
         {"fit", "fitted sky", picture([&](int, const auto& d) { return fitted(d); })},
-        {"error", "error of the fit", picture([&](int f, const auto&) { return error(f); })}};
+        {"error", "error of the fit (pale: not used)",
+         picture([&](int f, const auto&) { return error(f); })}};
   }
 
  private:
@@ -93,15 +95,18 @@ class Panels {
   }
 
   Eigen::Vector3f fitted(const Eigen::Vector3d& direction) const {
-    if (direction.z() < 0 || !fit_.sky.has_light()) return grey(kUnseen);
-    return shown(fit_.sky.radiance_in_sky(direction), white_);
+    if (direction.z() < 0 || !fit_.fitted.has_light()) return grey(kUnseen);
+    return shown(fit_.fitted.radiance_in_sky(direction), white_);
   }
 
   Eigen::Vector3f error(int f) const {
-    if (!fit_.used[f]) return grey(kNotUsed);
-    const Eigen::Vector3d model = fit_.sky.radiance_in_sky(fit_.light.sphere->centre(f));
-    const Eigen::Array3d ratio = model.array() / fit_.light.facets[f].mean.array();
-    return heat((ratio - 1).abs().mean() / kHottestSkyError);
+    const FacetLight& facet = fit_.light.facets[f];
+    if (!fit_.fitted.has_light() || !(facet.mean.minCoeff() > 0) || fit_.light.sphere->centre(f).z() <= 0)
+      return grey(kNoError);
+    const Eigen::Vector3d model = fit_.fitted.radiance_in_sky(fit_.light.sphere->centre(f));
+    const Eigen::Array3d ratio = model.array() / facet.mean.array();
+    const Eigen::Vector3f shown = heat((ratio - 1).abs().mean() / kHottestSkyError);
+    return fit_.used[f] ? shown : Eigen::Vector3f(grey(kNoError) + kDimmed * (shown - grey(kNoError)));
   }
 
   const SkyFit& fit_;
