@@ -199,12 +199,17 @@ class SkyInput(SkyCase):
 
     def test_what_cannot_be_had_is_a_named_fallback(self):
         grey = lambda x, y: [0.05 + 0.03 * ((x * 7 + y * 13) % 5)] * 3
-        white = lambda x, y: [1.0] * 3 if direction(x, y)[2] > 0.1 else grey(x, y)
+        white = lambda x, y: [1.0] * 3 if direction(x, y)[2] > 0.1 else grey(x, y)  # the walls do not clip
         cases = {"no sky in view": panorama(self.folder / "room.hdr", grey), "clipped": panorama(self.folder / "white.hdr", white)}
         for name, path in cases.items():
             with self.subTest(name):
                 _, summary = self.sky("fallback", "--facets", "4", data=path)
-                self.assertEqual((summary["skies"][0]["model"], summary["skies"][0]["fallback"]), ("none", name))
+                node = summary["skies"][0]
+                self.assertEqual((node["model"], node["fallback"]), ("none", name))
+                self.assertEqual([w for w in summary["warnings"] if "sky that clips: its light" in w or "no light is known" in w] != [],
+                                 name == "clipped")
+                self.assertAlmostEqual(node["clipped_share"], 0.9 if name == "clipped" else 0, delta=0.05)
+                self.assertAlmostEqual(node["mask_share"], 0.46 if name == "clipped" else 0, delta=0.03)
 
         def night(frames):
             for frame in frames: frame.update(node=1, time_utc="2003-08-21T04:50:00Z", latitude=42.36, longitude=-71.09)
@@ -225,6 +230,35 @@ class SkyInput(SkyCase):
         warnings = json.loads((self.folder / "warned/summary.json").read_text())["warnings"]
         self.assertTrue(any("frames[1]: node 1: a camera " in w and "frames[0]" in w for w in warnings), warnings)
         for warning in warnings: self.assertIn(warning, done.stderr)
+
+
+class SkySun(SkyCase):
+    def test_a_sun_is_measured_at_the_seam_and_near_the_zenith(self):
+        for azimuth, elevation in ((180, 40), (179, 40), (150, 85)):
+            with self.subTest(f"{azimuth}, {elevation}"):
+                a, e = math.radians(azimuth), math.radians(elevation)
+                sun = (math.cos(e) * math.sin(a), math.cos(e) * math.cos(a), math.sin(e))
+                path = panorama(self.folder / "seam.hdr", lambda x, y: clear_sky(x, y, sun))
+                _, summary = self.sky("seam", "--no-pictures", "--facets", "4", "--sun", f"{azimuth},{elevation}", data=path)
+                self.assertEqual(summary["skies"][0]["sun_light"], "measured")
+                self.assertEqual(summary["skies"][0]["sun_relative_sigma"], 0.02)
+
+    def test_a_sun_that_clips_is_estimated_and_says_how_well(self):
+        path = panorama(self.folder / "photo.hdr", lambda x, y: [min(1.0, 2 * v) for v in clear_sky(x, y)])
+        out, summary = self.sky("photo", "--no-pictures", "--facets", "4", data=path)
+        node = summary["skies"][0]
+        self.assertEqual((node["sun_light"], node["sun_relative_sigma"]), ("estimated", 0.4))
+        self.assertTrue(any("estimated, within a factor of 1.5" in w for w in summary["warnings"]), summary["warnings"])
+        self.assertEqual(json.loads((out / "sky/photo.json").read_text())["sun"]["irradiance_relative_sigma"], 0.4)
+
+    def test_a_sun_by_hand_says_whether_it_is_night(self):
+        def night(frames):
+            for frame in frames: frame.update(node=1, time_utc="2003-08-21T04:50:00Z", latitude=42.36, longitude=-71.09)
+
+        _, day = self.sky("day", "--no-pictures", "--sun", "181,60", data=self.frames("day", night))
+        _, below = self.sky("below", "--no-pictures", "--sun", "181,-20")
+        self.assertNotEqual(day["skies"][0]["fallback"], "night")
+        self.assertEqual((below["skies"][0]["model"], below["skies"][0]["fallback"]), ("none", "night"))
 
 
 class SkyMeasures(SkyCase):

@@ -59,6 +59,7 @@ ordered_json sun_json(const NodeSky& sky) {
   out["by_images"] = optional_angles(sky.sun_by_images);
   out["light"] = to_string(sky.sun_light);
   out["irradiance"] = triple(sky.sun_irradiance);
+  out["irradiance_relative_sigma"] = sky.sun_relative_sigma;
   return out;
 }
 
@@ -82,7 +83,9 @@ ordered_json to_json(const NodeSky& sky) {
           {"blue", channel_json(sky, 2)},
           {"clearness_bin", sky.clearness_bin},
           {"mean_error", sky.mean_error},
+          {"inlier_share", sky.inlier_share},
           {"sky_share", sky.sky_share},
+          {"clipped_share", sky.clipped_share},
           {"seen_share", sky.seen_share},
           {"mean_disagreement", sky.mean_disagreement},
           {"horizontal_irradiance", triple(light.horizontal_irradiance(Disc::kWith))},
@@ -107,6 +110,8 @@ class Fields {
   std::string where(const char* key) const { return where_ + ": " + key; }
 
   double number(const char* key) const { return number_of(at(key), key); }
+  /// 0 where an older file does not have it.
+  double number_or_zero(const char* key) const { return object_.contains(key) ? number(key) : 0; }
   int whole(const char* key, int low, int high) const {
     const double value = number(key);
     if (value != std::floor(value) || value < low || value > high)
@@ -181,6 +186,7 @@ void read_sun(const Fields& fields, NodeSky& sky) {
   sky.sun_by_images = read_angles(fields, "by_images");
   sky.sun_light = fields.choice("light", SunLight::kEstimated);
   sky.sun_irradiance = fields.vector("irradiance");
+  sky.sun_relative_sigma = fields.number_or_zero("irradiance_relative_sigma");
 }
 
 void read_rotation(const Fields& fields, NodeSky& sky) {
@@ -215,7 +221,9 @@ NodeSky from_json(const json& root, const std::string& file) {
   for (int c = 0; c < 3; ++c) read_channel(fields.object(kChannels[c]), sky, c);
   sky.clearness_bin = fields.whole("clearness_bin", 0, kClearnessBins - 1);
   sky.mean_error = fields.number("mean_error");
+  sky.inlier_share = fields.number_or_zero("inlier_share");
   sky.sky_share = fields.number("sky_share");
+  sky.clipped_share = fields.number_or_zero("clipped_share");
   sky.seen_share = fields.number("seen_share");
   sky.mean_disagreement = fields.number("mean_disagreement");
   for (const json& view : fields.at("views")) {

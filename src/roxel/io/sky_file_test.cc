@@ -34,6 +34,7 @@ class SkyFile : public ::testing::Test {
     s.clearness_bin = 7;
     s.sun_by_time = s.sun;
     s.mean_error = 0.0123;
+    s.sun_relative_sigma = 0.17, s.inlier_share = 0.8, s.clipped_share = 0.06;
     s.sky_share = 0.4, s.seen_share = 0.9, s.mean_disagreement = 0.003;
     return s;
   }
@@ -68,6 +69,9 @@ TEST_F(SkyFile, ReadsWhatItWroteExactly) {
   EXPECT_EQ(after.mean_error, before.mean_error);
   EXPECT_EQ(after.clearness_bin, before.clearness_bin);
   EXPECT_EQ(after.sky_share, before.sky_share);
+  EXPECT_EQ(after.sun_relative_sigma, before.sun_relative_sigma);
+  EXPECT_EQ(after.inlier_share, before.inlier_share);
+  EXPECT_EQ(after.clipped_share, before.clipped_share);
 }
 
 TEST_F(SkyFile, WritesTheMapThatTheSkyMakes) {

@@ -10,13 +10,14 @@
 namespace roxel {
 namespace {
 
-constexpr float kUnseen = 0.15f, kNotUsed = 0.35f;
+constexpr float kUnseen = 0.15f, kNoError = 0.35f;
+constexpr float kDimmed = 0.5f;  ///< heat of facets that the fit did not use
 
 constexpr std::pair<const char*, const char*> kCaptions[] = {
     {"seen", "as the images show it"}, {"variance", "too much contrast"},
     {"red_blue", "not blue"},          {"luminance", "dark"},
     {"used", "facets of the fit"},     {"fit", "fitted sky"},
-    {"error", "error of the fit"}};
+    {"error", "error of the fit (pale: not used)"}};
 
 std::string caption_of(const std::string& name, bool left_out) {
   for (const auto& [known, caption] : kCaptions)
@@ -111,15 +112,18 @@ class Panels {
   }
 
   Eigen::Vector3f fitted(const Eigen::Vector3d& direction) const {
-    if (direction.z() < 0 || !fit_.sky.has_light()) return grey(kUnseen);
-    return shown(fit_.sky.radiance_in_sky(direction), white_);
+    if (direction.z() < 0 || !fit_.fitted.has_light()) return grey(kUnseen);
+    return shown(fit_.fitted.radiance_in_sky(direction), white_);
   }
 
   Eigen::Vector3f error(int f) const {
-    if (!fit_.used[f]) return grey(kNotUsed);
-    const Eigen::Vector3d model = fit_.sky.radiance_in_sky(fit_.light.sphere->centre(f));
-    const Eigen::Array3d ratio = model.array() / fit_.light.facets[f].mean.array();
-    return heat((ratio - 1).abs().mean() / kHottestSkyError);
+    const FacetLight& facet = fit_.light.facets[f];
+    if (!fit_.fitted.has_light() || !(facet.mean.minCoeff() > 0) || fit_.light.sphere->centre(f).z() <= 0)
+      return grey(kNoError);
+    const Eigen::Vector3d model = fit_.fitted.radiance_in_sky(fit_.light.sphere->centre(f));
+    const Eigen::Array3d ratio = model.array() / facet.mean.array();
+    const Eigen::Vector3f shown = heat((ratio - 1).abs().mean() / kHottestSkyError);
+    return fit_.used[f] ? shown : Eigen::Vector3f(grey(kNoError) + kDimmed * (shown - grey(kNoError)));
   }
 
   const SkyFit& fit_;

@@ -25,7 +25,7 @@ inline constexpr double kHottestSkyError = 0.25;
 
 /// Seven pictures of `width` columns. The masks' pictures show what each takes out: variance red, red over
 /// blue yellow, luminance green; "used" tints the facets of the fit blue. Error: black none, white a quarter
-/// and more, grey not used.
+/// and more, of all that is seen above the horizon; half as strong, on grey, where the fit did not use it.
 std::vector<SkyPanel> sky_panels(const SkyFit& fit, int width = 480);
 
 /// Those pictures for the page, with the reason for the choice of masks.

@@ -107,10 +107,6 @@ Eigen::Vector3d NodeSky::radiance(const Eigen::Vector3d& direction) const {
   return in_sky.z() < 0 ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : radiance_in_sky(in_sky);
 }
 
-Eigen::Vector3d NodeSky::radiance_sigma(const Eigen::Vector3d& direction) const {
-  return radiance(direction).cwiseProduct(relative_sigma);
-}
-
 SkyLight::SkyLight(const NodeSky& sky)
     : up_(sky.sky_from_world.transpose() * Eigen::Vector3d::UnitZ()),
       sun_(sky.sun_in_world()),

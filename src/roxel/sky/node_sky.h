@@ -63,9 +63,15 @@ struct NodeSky {
   SunLight sun_light = SunLight::kNone;
   Eigen::Vector3d sun_irradiance = Eigen::Vector3d::Zero();  ///< on a surface that faces the sun
 
-  double mean_error = 0;         ///< mean of |model / seen - 1| over the facets used and channels
-  double sky_share = 0;          ///< of the upper hemisphere: facets used
-  double seen_share = 0;         ///< of the upper hemisphere: facets in view
+  /// Standard deviation over mean of its luminance, as far as it is known: between the images that measure
+  /// it, or of the estimate.
+  double sun_relative_sigma = 0;
+
+  double mean_error = 0;     ///< mean of |model / seen - 1| over the facets used and channels
+  double sky_share = 0;      ///< of the upper hemisphere: facets used
+  double clipped_share = 0;  ///< of the upper hemisphere: facets that are sky but clip, the sun's left out
+  double inlier_share = 0;   ///< of the area that masks or fit took for sky: facets used
+  double seen_share = 0;     ///< of the upper hemisphere: facets in view
   double mean_disagreement = 0;  ///< between pictures, of the luminance of facets used that several see
 
   bool has_light() const { return model != SkyModel::kNone; }
@@ -74,8 +80,6 @@ struct NodeSky {
 
   /// Of the sky in a direction (unit) without the sun's disc; 0 below the horizon and without a model.
   Eigen::Vector3d radiance(const Eigen::Vector3d& direction) const;
-  /// Standard deviation of that a channel, in the unit of radiance.
-  Eigen::Vector3d radiance_sigma(const Eigen::Vector3d& direction) const;
   /// Radiance in the sky's own frame, also below the horizon as if at it.
   Eigen::Vector3d radiance_in_sky(const Eigen::Vector3d& direction) const;
 };

@@ -23,6 +23,9 @@ enum class PerezFreedom {
   kExponent,   ///< and h
 };
 
+/// Strength of the prior that sky fits use: as much as a relative error of 0.7 % at one of its deviations.
+inline constexpr double kSkyPrior = 2e-5;
+
 struct PerezFitOptions {
   PerezFreedom freedom = PerezFreedom::kFull;
   std::vector<PerezShape> starts;  ///< at least one; see published_starts

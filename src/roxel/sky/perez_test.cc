@@ -9,7 +9,7 @@ namespace roxel {
 namespace {
 
 void expect_shape(const PerezShape& s, double a, double b, double c, double d, double e) {
-  constexpr double kRounding = 2e-5;
+  constexpr double kRounding = 6e-6;
   EXPECT_NEAR(s.a, a, kRounding);
   EXPECT_NEAR(s.b, b, kRounding);
   EXPECT_NEAR(s.c, c, kRounding);
@@ -18,15 +18,40 @@ void expect_shape(const PerezShape& s, double a, double b, double c, double d, d
   EXPECT_EQ(s.h, 1);
 }
 
-TEST(PublishedPerez, IsTheTableOfCoefficientsAtSamplePoints) {
-  // By hand from [Perez93] table 1: x1 + x2 Z + brightness (x3 + x4 Z).
-  expect_shape(published_perez(7, 0.5, 0.1), -0.975, -0.189265, 21.96977, -5.66253, 1.39252);
-  expect_shape(published_perez(4, 1.0, 0.3), -1.0091, -0.80861, 11.93198, -3.1139, 0.0213);
-  expect_shape(published_perez(2, 0.0, 0.2), -0.92096, -0.6218, 17.1819, -4.21542, 0.06838);
-}
+struct TablePoint {
+  int bin;
+  double zenith, brightness;
+  std::array<double, 5> abcde;
+};
 
-TEST(PublishedPerez, HasFormulasOfItsOwnForOvercastSkies) {
-  expect_shape(published_perez(0, 0.5, 0.2), 1.02624, -0.5243, 0.739333, -0.519082, -0.04168);
+TEST(PublishedPerez, IsTheTableOfCoefficientsInAllEightBins) {
+  // From [Perez93] table 1, eq. (6) to (8), worked out apart: x1 + x2 Z + brightness (x3 + x4 Z), and the
+  // formulas of their own that c and d have in the first bin. Two points a bin change all four coefficients.
+  const TablePoint points[] = {
+      {0, 0.3, 0.4, {0.99523, -0.27223, 2.46542, -1.19555, -0.11124}},
+      {0, 1.2, 0.15, {0.74444, -0.59734, 0.57423, -0.46749, -0.02081}},
+      {1, 0.3, 0.4, {-0.75569, -1.64964, 9.59243, -2.43175, 0.14354}},
+      {1, 1.2, 0.15, {-1.73899, -0.58347, 8.13273, -2.43726, 0.23306}},
+      {2, 0.3, 0.4, {-0.81550, -1.43497, 9.89880, -3.28875, 0.13353}},
+      {2, 1.2, 0.15, {-1.26471, -0.40245, 9.64134, -3.05708, 0.13891}},
+      {3, 0.3, 0.4, {-0.76950, -1.42009, 9.19827, -3.02770, 0.32803}},
+      {3, 1.2, 0.15, {-1.25885, -0.40171, 11.41546, -3.30681, 0.05132}},
+      {4, 0.3, 0.4, {-1.42798, -1.74292, 11.80398, -2.93628, -0.01559}},
+      {4, 1.2, 0.15, {-0.98442, -0.16749, 13.34755, -3.40377, 0.06199}},
+      {5, 0.3, 0.4, {-0.55397, -1.00734, 11.74942, -3.67392, 0.11583}},
+      {5, 1.2, 0.15, {-1.05191, -0.32186, 13.08747, -3.40797, 0.37278}},
+      {6, 0.3, 0.4, {-0.85410, -0.15722, 17.76839, -3.80687, 0.12835}},
+      {6, 1.2, 0.15, {-0.99145, -0.25772, 12.84288, -3.86453, 0.48829}},
+      {7, 0.3, 0.4, {-0.82785, 0.02122, 14.91158, -1.69489, 2.11741}},
+      {7, 1.2, 0.15, {-0.88680, -0.06912, 16.71278, -4.63049, 1.10879}},
+  };
+  for (const TablePoint& p : points) {
+    SCOPED_TRACE(p.bin);
+    const auto& [a, b, c, d, e] = p.abcde;
+    expect_shape(published_perez(p.bin, p.zenith, p.brightness), a, b, c, d, e);
+  }
+  const std::array<double, 8> lower_ends{1, 1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2};
+  EXPECT_EQ(kClearness, lower_ends);
 }
 
 TEST(PublishedPerez, RefusesBinsThatDoNotExist) {

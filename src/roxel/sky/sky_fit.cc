@@ -19,7 +19,6 @@ constexpr double kShareForShape = 0.03;  ///< of the hemisphere, for free parame
 constexpr double kAgreeSigmas = 3, kAlwaysAgrees = 0.12, kAtHorizon = 0.5, kHorizonDeg = 6;
 constexpr double kAgreesWithOneColor = 0.35;  ///< real skies have a gradient
 constexpr double kAtSun = 0.5, kSunDeg = 10;
-constexpr double kPriorStrength = 2e-5;  ///< as much as a relative error of 0.7 % at one prior deviation
 /// Regions apart from the sky's (gaps, arches) must be about as bright and of that colour: windows are
 /// darker.
 constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
@@ -29,15 +28,28 @@ constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
 constexpr double kSurelySun = 30;  ///< contrast of a spot worth a warning: lamps and white walls have less
+constexpr double kGlare = 1.3;     ///< brightness beside a sun over that further away
+/// Of log sunlight, over nine skies (docs/results/sky.md); of one measurement.
+constexpr double kEstimatedSunSigma = 0.4, kMeasuredSunSigma = 0.02;
+/// Facets that clip: share of the clip level that a model must come to, and how far other channels may be
+/// off.
+constexpr double kAboutClips = 0.75, kClippedColor = 0.3;
+constexpr double kBorneOutByFit = 0.5;  ///< of clipped sky high up, by a fit to what does not clip
+constexpr double kMuchClipped = 0.1;    ///< of what is fitted, worth a warning
+constexpr double kFewPixels = 2;
+constexpr const char* kNight = "night";
 
 double angle_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::acos(std::clamp(a.dot(b), -1.0, 1.0)) / kDegree;
 }
 
-/// Direct over diffuse light by the middle of each bin of clearness [Perez93] eq. (1).
-double direct_over_diffuse(int bin, double sun_zenith) {
-  constexpr double kMiddle[kClearnessBins] = {1.02, 1.14, 1.36, 1.7, 2.3, 3.5, 5.3, 9};
-  return (kMiddle[bin] - 1) * (1 + 1.041 * std::pow(sun_zenith, 3));
+/// Light of a clear sky's sun on a surface that faces it, over that of its dome on the horizontal: mean
+/// values in lux [IES84], for clean or hazy air by -b of the fit, which is 0.31 in theirs. The power is read
+/// off 24 computed skies whose light is scattered more than once: within 4 % there (docs/sky.md).
+double direct_over_diffuse(double sine_elevation, double haze) {
+  const double sine = std::max(0.02, sine_elevation);
+  const double sun = 127500 * std::exp(-0.21 / sine), dome = 800 + 15500 * std::sqrt(sine);
+  return sun / dome * std::pow(0.31 / std::clamp(haze, 0.15, 0.8), 1.3);
 }
 
 /// Colour of sunlight through clean air with some haze, luminance 1.
@@ -64,9 +76,14 @@ class Fitting {
     out_.masks = sky_masks(out_.light, known_sun(), options_.masks);
     out_.used = out_.masks.sky;
     fit();
+    find_clipped_sky();
     find_beyond_model();
     measure_fit();
+    make_sure_of_found_sun();
     weigh_sun();
+    out_.fitted = sky();
+    give_up_clipped_light();
+    warn();
     return std::move(out_);
   }
 
@@ -114,20 +131,12 @@ class Fitting {
   }
 
   void find_suns() {
-    const auto found = find_sun(out_.light);
-    if (found) sky().sun_by_images = found->direction;
-    if (!sky().sun_by_images) return;
-    if (!known_sun()) {
-      use_sun(SunSource::kImages, *sky().sun_by_images);
-      for (std::size_t i = 0; i < task_.views.size(); ++i) measure(pictures_(static_cast<int>(i)));
-      return;
-    }
-    const double apart = angle_deg(sky().sun, *sky().sun_by_images);
-    if (apart > kSunsDifferDeg && found->contrast > kSurelySun)
-      out_.warnings.push_back(
-          formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
-                    "reflection, or a wrong time, place or north",
-                    sky().sun_source == SunSource::kGiven ? "by hand" : "by time", apart));
+    found_ = find_sun(out_.light);
+    if (!found_) return;
+    sky().sun_by_images = found_->direction;
+    if (known_sun()) return;
+    use_sun(SunSource::kImages, found_->direction);
+    for (std::size_t i = 0; i < task_.views.size(); ++i) measure(pictures_(static_cast<int>(i)));
   }
 
   double share_used() const {
@@ -137,23 +146,17 @@ class Fitting {
     return area / kHemisphere;
   }
 
-  double share_clipped() const {
-    double area = 0;
-    for (int f = 0; f < sphere_->count(); ++f)
-      if (sphere_->centre(f).z() > 0 && out_.light.facets[f].clipped > out_.light.facets[f].weight)
-        area += sphere_->solid_angle(f);
-    return area / kHemisphere;
-  }
-
   /// What the pictures can decide, and why not more.
   SkyModel decidable() {
-    if (sky().sun_by_time && sky().sun_by_time->z() < std::sin(kNightDeg * kDegree)) {
-      sky().fallback = "night";
+    sky().fallback.clear();
+    const bool computed = sky().sun_source == SunSource::kGiven || sky().sun_source == SunSource::kTime;
+    if (computed && sky().sun.z() < std::sin(kNightDeg * kDegree)) {
+      sky().fallback = kNight;
       return SkyModel::kNone;
     }
     const double share = share_used();
     if (share < kLeastShare) {
-      sky().fallback = share_clipped() > kLeastShare ? kClippedSky : "no sky in view";
+      sky().fallback = "no sky in view";
       return SkyModel::kNone;
     }
     if (share < kShareForShape) {
@@ -173,18 +176,20 @@ class Fitting {
     return samples;
   }
 
+  /// Facets change from round to round, and with them what can be decided.
   void fit() {
     sky().model = decidable();
     for (out_.rounds = 0; sky().has_light() && out_.rounds < options_.most_rounds && !out_.settled;
          ++out_.rounds) {
       fit_channels();
-      const std::vector<std::uint8_t> agreeing = agreeing_facets();
+      std::vector<std::uint8_t> agreeing = agreeing_facets();
       out_.settled = agreeing == out_.used;
-      out_.used = agreeing;
-      if (share_used() < kLeastShare) {
-        sky().model = SkyModel::kNone;
-        sky().fallback = "no sky in view";
-      }
+      out_.used = std::move(agreeing);
+      const SkyModel before = sky().model;
+      sky().model = decidable();
+      if (sky().model == before) continue;
+      out_.settled = false, fitted_before_ = false;
+      if (out_.rounds + 1 == options_.most_rounds && sky().has_light()) fit_channels();
     }
     if (!sky().has_light()) std::fill(out_.used.begin(), out_.used.end(), std::uint8_t{0});
   }
@@ -192,7 +197,7 @@ class Fitting {
   void fit_channels() {
     const std::vector<SkySample> seen = samples();
     PerezFitOptions fit;
-    fit.prior_strength = kPriorStrength;
+    fit.prior_strength = kSkyPrior;
     fit.freedom = options_.free_exponent ? PerezFreedom::kExponent : PerezFreedom::kFull;
     if (sky().model == SkyModel::kPublished || sky().model == SkyModel::kUniform)
       fit.freedom = PerezFreedom::kScaleOnly;
@@ -200,9 +205,10 @@ class Fitting {
     for (int c = 0; c < 3; ++c) {
       fit.starts = sky().model == SkyModel::kUniform ? std::vector<PerezShape>{PerezShape{}}
                                                      : published_starts(sky().sun);
-      if (out_.rounds > 0) fit.starts = {sky().channels[c].shape};
+      if (fitted_before_) fit.starts = {sky().channels[c].shape};
       sky().channels[c] = fit_perez(seen, c, sky().sun, fit).channel;
     }
+    fitted_before_ = true;
     fit_residual(seen);
     find_sigma(seen);
   }
@@ -266,6 +272,7 @@ class Fitting {
 
   /// Facets that agree with the model and hang together with those that were used.
   std::vector<std::uint8_t> agreeing_facets() const {
+    if (out_.masks.by_hand) return out_.masks.sky;  // a person said which, and which alone
     std::vector<std::uint8_t> agreeing(out_.used.size());
     std::vector<int> queue;
     const auto take = [&](int f) {
@@ -284,6 +291,71 @@ class Fitting {
     return agreeing;
   }
 
+  /// Whether a facet that clips is what the model says of it: it would clip, too, and what does not clip has
+  /// that colour.
+  bool clips_as_fitted(int f) const {
+    const FacetLight& facet = out_.light.facets[f];
+    const Eigen::Vector3d model = out_.sky.radiance_in_sky(sphere_->centre(f));
+    if (model.maxCoeff() < kAboutClips * facet.clip) return false;
+    for (int c = 0; c < 3; ++c) {
+      const double seen = facet.clipped_mean[c];
+      if (model[c] < (seen < facet.clip ? 1 - kClippedColor : kAboutClips) * std::min(seen, facet.clip))
+        return false;
+      if (seen < kAboutClips * facet.clip && model[c] > (1 + kClippedColor) * seen) return false;
+    }
+    return true;
+  }
+
+  /// Facets that clip: those that go on where the fit ends, as it says; and where the highest of all that is
+  /// seen clips and the fit does not bear that out, all that hang together there.
+  void find_clipped_sky() {
+    out_.clipped_sky.assign(out_.used.size(), 0);
+    if (sky().fallback == kNight) return;
+    std::vector<int> queue;
+    const auto take = [&](int f) { out_.clipped_sky[f] = 1, queue.push_back(f); };
+    const auto spread = [&](int from, const auto& belongs) {
+      for (const int next : sphere_->neighbours(from)) {
+        const bool above =
+            sphere_->centre(next).z() > std::sin(options_.masks.lowest_elevation_deg * kDegree);
+        if (above && !out_.clipped_sky[next] && clipped_share(out_.light.facets[next]) > kClippedShare &&
+            belongs(next))
+          take(next);
+      }
+    };
+    const auto as_fitted = [&](int f) { return out_.masks.near_sun[f] || clips_as_fitted(f); };
+    if (sky().has_light() && !out_.masks.by_hand)
+      for (int f = 0; f < sphere_->count(); ++f)
+        if (out_.used[f]) spread(f, as_fitted);
+    for (std::size_t i = 0; i < queue.size(); ++i) spread(queue[i], as_fitted);
+    double white = 0, borne_out = 0;
+    for (const int f : out_.masks.white) {
+      const double height = sphere_->solid_angle(f) * sphere_->centre(f).z();
+      white += height;
+      if (out_.clipped_sky[f]) borne_out += height;
+    }
+    if (borne_out >= kBorneOutByFit * white) return;
+    queue.clear();
+    for (const int f : out_.masks.white) take(f);
+    const auto at_border = [&](int f) {
+      return !out_.masks.by_hand && out_.light.facets[f].coverage < options_.masks.least_coverage;
+    };
+    for (std::size_t i = 0; i < queue.size(); ++i) spread(queue[i], at_border);
+  }
+
+  /// Where more of the sky clips than was fitted, the rest says little of its light.
+  void give_up_clipped_light() {
+    double clipped = 0;
+    for (int f = 0; f < sphere_->count(); ++f)
+      if (out_.clipped_sky[f] && !out_.masks.near_sun[f]) clipped += sphere_->solid_angle(f) / kHemisphere;
+    sky().clipped_share = out_.fitted.clipped_share = clipped;
+    if (clipped < kLeastShare || clipped <= share_used()) return;
+    sky().model = SkyModel::kNone;
+    sky().fallback = kClippedSky;
+    sky().sun_light = SunLight::kNone;
+    sky().sun_irradiance.setZero();
+    sky().sun_relative_sigma = 0;
+  }
+
   /// Clouds over a clear sky, and the blue between clouds.
   bool may_be_cloud(int f) const {
     const FacetLight& facet = out_.light.facets[f];
@@ -296,7 +368,7 @@ class Fitting {
 
   void find_beyond_model() {
     out_.beyond_model.assign(out_.used.size(), 0);
-    if (!sky().has_light()) return;
+    if (!sky().has_light() || out_.masks.by_hand) return;
     std::vector<int> queue;
     const auto spread = [&](int from) {
       for (const int next : sphere_->neighbours(from))
@@ -310,19 +382,24 @@ class Fitting {
 
   void measure_fit() {
     NodeSky& s = sky();
-    double error = 0, weight = 0, disagreement = 0, seen_twice = 0, in_view = 0;
+    double error = 0, weight = 0, disagreement = 0, seen_twice = 0, in_view = 0, taken_for_sky = 0,
+           pixels = 0;
     for (int f = 0; f < sphere_->count(); ++f) {
       const FacetLight& facet = out_.light.facets[f];
       const double area = sphere_->solid_angle(f);
       if (sphere_->centre(f).z() > 0) in_view += area * facet.coverage;
+      if (out_.masks.sky[f] && !out_.used[f]) taken_for_sky += area;
       if (!out_.used[f]) continue;
       const Eigen::Array3d ratio = s.radiance_in_sky(sphere_->centre(f)).array() / facet.mean.array();
       error += area * (ratio - 1).abs().mean();
       weight += area;
+      pixels += area * facet.pixels;
       if (facet.pictures > 1) disagreement += area * facet.disagreement, seen_twice += area;
     }
     s.seen_share = in_view / kHemisphere;
     s.sky_share = weight / kHemisphere;
+    out_.pixels_per_facet = weight > 0 ? pixels / weight : 0;
+    s.inlier_share = weight > 0 ? weight / (weight + taken_for_sky) : 0;
     s.mean_error = weight > 0 ? error / weight : 0;
     s.mean_disagreement = seen_twice > 0 ? disagreement / seen_twice : 0;
     if (s.has_light()) find_clearness();
@@ -336,39 +413,134 @@ class Fitting {
     sky().clearness_bin = known_sun() ? fit_perez(samples(), 1, sky().sun, fit).start : 0;
   }
 
-  /// Whether facets around the sun were taken for sky: then nothing hides it.
-  bool sky_around_sun() const {
-    double around = 0, used = 0;
+  /// Share of the ring around a direction, from `inner` to `outer` degrees, that is of the fit, and its mean
+  /// luminance.
+  struct Ring {
+    double used_share = 0, luminance = 0;
+  };
+  Ring ring_around(const Eigen::Vector3d& direction, double inner, double outer) const {
+    double around = 0, used = 0, light = 0;
     for (int f = 0; f < sphere_->count(); ++f) {
-      const double apart = angle_deg(sphere_->centre(f), out_.sky.sun);
-      if (apart < 3.5 || apart > 8) continue;
+      const double apart = angle_deg(sphere_->centre(f), direction);
+      if (apart < inner || apart > outer) continue;
       around += sphere_->solid_angle(f);
-      if (out_.used[f]) used += sphere_->solid_angle(f);
+      if (!out_.used[f]) continue;
+      used += sphere_->solid_angle(f);
+      light += sphere_->solid_angle(f) * luminance(out_.light.facets[f].mean);
     }
-    return used > 0.5 * around;
+    return around > 0 && used > 0 ? Ring{used / around, light / used} : Ring{};
   }
+
+  /// Whether facets around the sun were taken for sky: then nothing hides it.
+  bool sky_around_sun() const { return ring_around(out_.sky.sun, 3.5, 8).used_share > 0.5; }
+
+  /// The sun where none is seen though the sky there is clear, brighter towards the horizon: it stands
+  /// elsewhere.
+  bool clear_without_sun() const {
+    return dark_ && !clipped_ && sky_around_sun() && out_.sky.model == SkyModel::kPerez && !overcast();
+  }
+
+  /// Brighter at the zenith than at the horizon.
+  bool overcast() const { return out_.sky.channels[1].shape.a > 0; }
 
   void weigh_sun() {
     NodeSky& s = sky();
     if (!s.has_light() || !known_sun() || s.sun.z() <= 0) return;
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    int measured = 0;
-    bool dark = false, clipped = false;
+    std::vector<Eigen::Vector3d> measured;
     for (const SunMeasure& m : measures_) {
-      clipped |= m.clipped;
-      dark |= !m.shines;
-      if (m.shines && !m.clipped) sum += m.irradiance, ++measured;
+      clipped_ |= m.clipped;
+      dark_ |= !m.shines;
+      if (m.shines && !m.clipped) measured.push_back(m.irradiance);
     }
-    if (measured > 0) {
-      s.sun_light = SunLight::kMeasured;
-      s.sun_irradiance = sum / measured;
-      return;
-    }
-    if (!clipped && ((dark && sky_around_sun()) || s.clearness_bin <= 1)) return;  // overcast
+    if (!measured.empty()) return use_measured(measured);
+    if (overcast() || (!clipped_ && dark_ && sky_around_sun() && !clear_without_sun())) return;
     const double diffuse = luminance(SkyLight(s).horizontal_irradiance(Disc::kWithout));
     s.sun_light = SunLight::kEstimated;
-    s.sun_irradiance = diffuse * direct_over_diffuse(std::max(2, s.clearness_bin), std::acos(s.sun.z())) *
-                       sunlight_color(s.sun.z());
+    s.sun_irradiance =
+        diffuse * direct_over_diffuse(s.sun.z(), -s.channels[1].shape.b) * sunlight_color(s.sun.z());
+    s.sun_relative_sigma = kEstimatedSunSigma;
+  }
+
+  void use_measured(const std::vector<Eigen::Vector3d>& measured) {
+    const auto count = static_cast<double>(measured.size());
+    NodeSky& s = sky();
+    s.sun_light = SunLight::kMeasured;
+    s.sun_irradiance.setZero();
+    for (const Eigen::Vector3d& m : measured) s.sun_irradiance += m / count;
+    double squares = 0;
+    for (const Eigen::Vector3d& m : measured) {
+      const double off = luminance(m) / luminance(s.sun_irradiance) - 1;
+      squares += off * off;
+    }
+    s.sun_relative_sigma = measured.size() > 1 ? std::sqrt(squares / (count - 1) / count) : kMeasuredSunSigma;
+  }
+
+  /// Glare, darker further out, in facets of the fit: a sun, however little it stands out where white is 1.
+  bool glares(const FoundSun& found) const {
+    const Ring near = ring_around(found.direction, found.radius_deg + 1, found.radius_deg + 5),
+               far = ring_around(found.direction, found.radius_deg + 10, found.radius_deg + 20);
+    return near.used_share > 0.5 && far.used_share > 0 && near.luminance > kGlare * far.luminance;
+  }
+
+  /// Whether the bright spot of the images is a sun; one that glares comes before what is merely bright.
+  void make_sure_of_found_sun() {
+    surely_ = found_ && found_->contrast > kSurelySun;
+    if (!out_.sky.has_light() || sky().sun_source == SunSource::kImages) return;
+    for (const FoundSun& spot : clipped_spots(out_.light)) {
+      if (!glares(spot)) continue;
+      found_ = spot, surely_ = true;
+      sky().sun_by_images = spot.direction;
+      return;
+    }
+  }
+
+  void warn() {
+    const auto say = [&](std::string text) { out_.warnings.push_back(std::move(text)); };
+    if (const int by_hand = out_.light.masked_by_hand; by_hand > 0 && by_hand < out_.light.pictures)
+      say(formatted("masks by hand for %d of %d images: sky is fitted only where those show it", by_hand,
+                    out_.light.pictures));
+    warn_of_clipping();
+    if (out_.pixels_per_facet > 0 && out_.pixels_per_facet < kFewPixels && sphere_->level() > 4)
+      say(formatted("%.1f pixels a facet: too few to tell texture, take fewer facets (--facets %d)",
+                    out_.pixels_per_facet, sphere_->level() - 1));
+    if (!out_.fitted.has_light()) return;
+    const bool apart = warn_of_suns();
+    if (!apart && clear_without_sun() && sky().sun_source != SunSource::kImages)
+      say(formatted(
+          "the sky is clear where the sun %s should be, and no sun is there: a wrong time, place or "
+          "north",
+          by_what()));
+    if (sky().sun_light == SunLight::kEstimated)
+      say(formatted("the sun's light is estimated, within a factor of %.1f: %s",
+                    std::exp(sky().sun_relative_sigma),
+                    clipped_ ? "its disc clips" : "no image shows its disc"));
+  }
+
+  const char* by_what() const { return out_.sky.sun_source == SunSource::kGiven ? "by hand" : "by time"; }
+
+  void warn_of_clipping() {
+    if (sky().fallback == kClippedSky)
+      out_.warnings.push_back(
+          formatted("%.0f %% of the dome is sky that clips, %.0f %% is not: no light is "
+                    "known, take darker images",
+                    100 * sky().clipped_share, 100 * share_used()));
+    else if (sky().clipped_share > kMuchClipped * share_used())
+      out_.warnings.push_back(
+          formatted("%.0f %% of the dome is sky that clips: its light is that of a fit to "
+                    "the other %.0f %%",
+                    100 * sky().clipped_share, 100 * share_used()));
+  }
+
+  /// Two suns.
+  bool warn_of_suns() {
+    if (!found_ || sky().sun_source == SunSource::kImages) return false;
+    const double apart = angle_deg(sky().sun, found_->direction);
+    if (apart < kSunsDifferDeg || !surely_) return false;
+    out_.warnings.push_back(
+        formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
+                  "reflection, or a wrong time, place or north",
+                  by_what(), apart));
+    return true;
   }
 
   const SkyTask& task_;
@@ -376,6 +548,10 @@ class Fitting {
   const SkyFitOptions& options_;
   std::shared_ptr<const FacetSphere> sphere_;
   std::vector<SunMeasure> measures_;
+  std::optional<FoundSun> found_;
+  bool surely_ = false;                  ///< found_ is a sun
+  bool dark_ = false, clipped_ = false;  ///< in an image, the place of the sun; its disc
+  bool fitted_before_ = false;           ///< channels hold a fit of this model
   SkyFit out_;
 };
 

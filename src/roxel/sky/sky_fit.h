@@ -39,10 +39,16 @@ struct SkyFit {
   NodeSky sky;
   SphereLight light;
   SkyMasks masks;
+  /// The sky as fitted to what does not clip: masks come from it. Differs from `sky` where most of it clips,
+  /// so that its light is not known.
+  NodeSky fitted;
   std::vector<std::uint8_t> used;  ///< facets of the last fit
+  /// Facets that are sky, but clip for more than a tenth. 1 = such a one.
+  std::vector<std::uint8_t> clipped_sky;
   /// Facets that are sky though the model does not agree with them, clouds: neutral, bright, next to the
   /// others, and a volume knows of nothing there. 1 = such a one.
   std::vector<std::uint8_t> beyond_model;
+  double pixels_per_facet = 0;  ///< of the fit, on average: below two, facets are finer than what is seen
   int rounds = 0;
   bool settled = false;  ///< the last round changed no facet
   std::vector<std::string> warnings;
@@ -53,8 +59,8 @@ struct SkyFit {
 SkyFit fit_sky(const SkyTask& task, const SkyPictureSource& pictures, const SkyFitOptions& options);
 
 /// How surely each pixel shows the sky, 0 to 255: agreement with the model where the picture, pixel by pixel,
-/// hangs together with facets that the fit used. Where the sky is clipped, what clips; all 0 without a model
-/// otherwise.
+/// hangs together with facets that the fit used. Where the sky clips, what clips; all 0 without a model
+/// and clipped sky.
 Mask soft_sky_mask(const SkyPicture& picture, const SkyFit& fit);
 
 }  // namespace roxel

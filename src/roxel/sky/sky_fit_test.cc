@@ -32,6 +32,11 @@ double iou(const Mask& sky, const Mask& surface) {
   return both / either;
 }
 
+bool warns(const SkyFit& fit, const std::string& text) {
+  return std::any_of(fit.warnings.begin(), fit.warnings.end(),
+                     [&](const std::string& w) { return w.find(text) != std::string::npos; });
+}
+
 SkyTask noon() {
   SkyTask task;
   task.time_utc_s = 1061484600;  // 2003-08-21T16:50:00Z
@@ -100,8 +105,7 @@ TEST(FitSky, TheSunsRegionOverridesTheMasks) {
 
 TEST(FitSky, WarnsWhereTimeAndImagesDisagreeOnTheSun) {
   const SkyFit wrong = fit_one(panorama_of(clear_sky(20, 50), {}), {}, noon());
-  ASSERT_EQ(wrong.warnings.size(), 1u);
-  EXPECT_NE(wrong.warnings[0].find("degrees apart"), std::string::npos);
+  EXPECT_TRUE(warns(wrong, "degrees apart"));
   EXPECT_EQ(wrong.sky.sun_source, SunSource::kTime);
   ASSERT_TRUE(wrong.sky.sun_by_images && wrong.sky.sun_by_time);
   const SunPosition sun = sun_position(*noon().time_utc_s, *noon().latitude_deg, *noon().longitude_deg);
@@ -117,16 +121,58 @@ TEST(FitSky, ASunByHandComesFirst) {
   EXPECT_LT((fit.sky.sun - sun_direction({77, 33})).norm(), 1e-9);
 }
 
+TEST(FitSky, ASunByHandSaysWhetherItIsNight) {
+  SkyTask night = noon();
+  *night.time_utc_s += 12 * 3600;
+  SkyFitOptions options;
+  options.sun = SunPosition{150, 40};
+  EXPECT_EQ(fit_one(panorama_of(clear_sky(), {}), options, night).sky.model, SkyModel::kPerez);
+  options.sun = SunPosition{150, -20};
+  for (const SkyTask& task : {SkyTask{}, noon()}) {
+    const SkyFit fit = fit_one(panorama_of(clear_sky(), {}), options, task);
+    EXPECT_EQ(fit.sky.model, SkyModel::kNone);
+    EXPECT_EQ(fit.sky.fallback, "night");
+  }
+}
+
 TEST(FitSky, MasksByHandAloneSayWhatIsSky) {
-  SkyPicture picture = panorama_of(clear_sky(), {});
+  Square square;
+  square.noise = 0.3f;  // of the variance mask
+  SkyPicture picture = panorama_of(clear_sky(), square);
   picture.known_sky = Mask(360, 180, 0);
   for (int y = 0; y < 40; ++y)
     for (int x = 0; x < 360; ++x) picture.known_sky.at(x, y) = 255;
   const SkyFit fit = fit_one(picture);
   EXPECT_EQ(fit.masks.reason, "masks by hand say what is sky");
-  for (int f = 0; f < fit.light.sphere->count(); ++f)
-    EXPECT_TRUE(!fit.masks.sky[f] || fit.light.sphere->centre(f).z() > std::sin(48 * kDegree));
-  EXPECT_GT(std::count(fit.masks.sky.begin(), fit.masks.sky.end(), 1), 100);
+  int marked = 0, used = 0;
+  for (int f = 0; f < fit.light.sphere->count(); ++f) {
+    if (fit.used[f]) {
+      EXPECT_GT(fit.light.sphere->centre(f).z(), std::sin(48 * kDegree)) << "none beyond";
+    }
+    if (fit.light.sphere->centre(f).z() < std::sin(54 * kDegree) || fit.masks.near_sun[f]) continue;
+    ++marked, used += fit.used[f];
+  }
+  EXPECT_EQ(used, marked) << "and none less";
+  EXPECT_TRUE(fit.warnings.empty());
+  picture.known_sky = Mask(360, 180, 0);
+  EXPECT_EQ(fit_one(picture).sky.fallback, "no sky in view");
+}
+
+TEST(FitSky, WarnsWhereOnlySomeImagesHaveMasksByHand) {
+  const SkyPicture without = panorama_of(clear_sky(), {});
+  SkyPicture with = without;
+  with.known_sky = Mask(360, 180, 0);
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 360; ++x) with.known_sky.at(x, y) = 255;
+  SkyFitOptions options;
+  options.facet_level = 4;
+  SkyTask task;
+  task.views = {"a", "b"};
+  const SkyFit fit = fit_sky(
+      task, [&](int i) { return i == 0 ? with : without; }, options);
+  ASSERT_EQ(fit.warnings.size(), 1u);
+  EXPECT_NE(fit.warnings[0].find("for 1 of 2 images"), std::string::npos) << fit.warnings[0];
+  EXPECT_GT(fit.sky.sky_share, 0.2);
 }
 
 /// A clear sky half covered by bright grey cloud with a soft texture, and what a perfect volume lets through.
@@ -200,16 +246,123 @@ TEST(FitSky, WithoutSkyInViewThereIsAName) {
   EXPECT_EQ(*std::max_element(mask.data().begin(), mask.data().end()), 0);
 }
 
-TEST(FitSky, ASkyThatClipsHasAName) {
-  SkyPicture picture = panorama_of(overcast_sky(), {});
-  for (float& value : picture.rgb.data()) value = std::min(1.0f, 20 * value);
+/// As a camera with 8 bits shows it, from a factor of exposure on.
+SkyPicture exposed(SkyPicture picture, float gain) {
+  for (float& value : picture.rgb.data()) value = std::round(255 * std::min(1.0f, gain * value)) / 255;
   picture.clip = clip_level(picture.rgb);
-  const SkyFit fit = fit_one(picture, {}, noon());
-  EXPECT_EQ(fit.sky.model, SkyModel::kNone);
-  EXPECT_EQ(fit.sky.fallback, "clipped");
-  const Mask mask = soft_sky_mask(picture, fit);
-  EXPECT_EQ(mask.at(100, 20), 255);
-  EXPECT_EQ(mask.at(100, 120), 0) << "below the horizon";
+  return picture;
+}
+
+TEST(FitSky, ASkyThatClipsHasANameAndItsMaskThoughWallsDoNotClip) {
+  Mask surface;
+  Square square;  // smooth facades and windows are what passes for sky here
+  square.wall = 0.02f, square.window = true;
+  const SkyPicture picture = panorama_of(overcast_sky(), square, &surface);
+  for (const float gain : {1.0f, 6.0f, 7.0f, 8.0f, 10.0f, 14.0f, 20.0f, 30.0f}) {
+    SCOPED_TRACE(gain);
+    const SkyPicture seen = exposed(picture, gain);  // the zenith clips from 6.7, the horizon from 16
+    const SkyFit fit = fit_one(seen, {}, noon());
+    EXPECT_GT(iou(soft_sky_mask(seen, fit), surface), 0.95);
+    EXPECT_EQ(fit.sky.sun_light, SunLight::kNone) << "no sun is made up";
+    const bool most = fit.sky.clipped_share > fit.sky.sky_share;
+    EXPECT_EQ(fit.sky.fallback, most ? "clipped" : "");
+    EXPECT_EQ(fit.sky.model, most ? SkyModel::kNone : SkyModel::kPerez);
+    EXPECT_EQ(warns(fit, "of the dome is sky that clips"), gain > 6);
+    EXPECT_TRUE(gain > 6 || !most);
+    EXPECT_TRUE(gain < 14 || most);
+  }
+}
+
+TEST(FitSky, SunlitWallsThatClipAreNoSky) {
+  Mask surface;
+  Square square;
+  square.wall = 1.5f;
+  const SkyPicture picture = panorama_of(clear_sky(181.19, 59.73), square, &surface);
+  for (const float gain : {1.0f, 2.0f, 3.0f}) {
+    SCOPED_TRACE(gain);
+    const SkyPicture seen = exposed(picture, gain);
+    const SkyFit fit = fit_one(seen, {}, noon());
+    EXPECT_EQ(fit.sky.model, SkyModel::kPerez);
+    EXPECT_GT(iou(soft_sky_mask(seen, fit), surface), 0.95);
+    EXPECT_EQ(fit.sky.sun_light, SunLight::kEstimated);
+    EXPECT_GT(fit.sky.sun_relative_sigma, 0.3);
+    EXPECT_TRUE(warns(fit, "sun's light is estimated"));
+  }
+}
+
+TEST(FitSky, WarnsOfAWrongTimeInPhotographsToo) {
+  const SkyFit wrong = fit_one(exposed(panorama_of(clear_sky(60, 35), {}), 1), {}, noon());
+  EXPECT_TRUE(warns(wrong, "degrees apart"));
+  EXPECT_EQ(wrong.sky.sun_light, SunLight::kEstimated) << "no sun there does not say that none shines";
+  const SunPosition sun = sun_position(*noon().time_utc_s, *noon().latitude_deg, *noon().longitude_deg);
+  EXPECT_FALSE(
+      warns(fit_one(exposed(panorama_of(clear_sky(sun.azimuth_deg, sun.elevation_deg), {}), 1), {}, noon()),
+            "apart"));
+}
+
+TEST(FitSky, WarnsOfAClearSkyWithoutTheSunWhereItShouldBe) {
+  Square square;
+  square.disc = false;
+  EXPECT_TRUE(warns(fit_one(panorama_of(clear_sky(40, 50), square), {}, noon()), "no sun is there"));
+  square.wall = 0.02f;
+  EXPECT_FALSE(warns(fit_one(panorama_of(overcast_sky(), square), {}, noon()), "no sun is there"));
+}
+
+TEST(FitSky, SunlightThatNoImageShowsIsEstimatedUnderClearSkiesAlone) {
+  // The sun stands behind a wall.
+  const NodeSky truth = clear_sky(181.19, 59.73);
+  Square square;
+  square.disc = false;
+  const auto hidden = [&](const NodeSky& sky) {
+    SkyPicture picture = panorama_of(sky, square);
+    for (int y = 0; y < 180; ++y)
+      for (int x = 0; x < 360; ++x)
+        if (picture.rays.direction(x + 0.5, y + 0.5).dot(truth.sun) > std::cos(15 * kDegree))
+          std::fill_n(picture.rgb.pixel(x, y), 3, 0.02f * (1 + 0.5f * unrest(x, y)));
+    return picture;
+  };
+  const SkyFit clear = fit_one(hidden(truth), {}, noon());
+  EXPECT_EQ(clear.sky.sun_light, SunLight::kEstimated);
+  EXPECT_TRUE(warns(clear, "no image shows its disc"));
+  const double ratio = luminance(clear.sky.sun_irradiance) /
+                       luminance(SkyLight(clear.sky).horizontal_irradiance(Disc::kWithout));
+  // [IES84] at 59.7 degrees: 99 981 lx over 15 204 lx; haze as fitted against 0.31.
+  EXPECT_NEAR(clear.sky.channels[1].shape.b, -0.23, 0.03);
+  EXPECT_NEAR(ratio, 99981.0 / 15204 * std::pow(0.31 / -clear.sky.channels[1].shape.b, 1.3), 0.01);
+  square.wall = 0.02f;
+  EXPECT_EQ(fit_one(hidden(overcast_sky()), {}, noon()).sky.sun_light, SunLight::kNone);
+}
+
+TEST(FitSky, WhatCanBeDecidedGrowsWithTheFacets) {
+  // Regions end at every step of brightness: what is surely sky is little, until the fit lets others in.
+  Square square;
+  square.noise = 0.03f;
+  SkyFitOptions options;
+  options.masks.step_limit = 0.003;
+  const SkyFit fit = fit_one(panorama_of(clear_sky(), square), options, {});
+  double sure = 0;
+  for (int f = 0; f < fit.light.sphere->count(); ++f)
+    if (fit.masks.sky[f]) sure += fit.light.sphere->solid_angle(f) / (2 * kPi);
+  ASSERT_LT(sure, 0.03);
+  EXPECT_GT(fit.sky.sky_share, 0.3);
+  EXPECT_EQ(fit.sky.model, SkyModel::kPerez);
+  EXPECT_EQ(fit.sky.fallback, "");
+  EXPECT_LT(dome_difference(fit.sky, clear_sky()), 0.05);
+}
+
+TEST(FitSky, SaysHowMuchOfWhatLooksLikeSkyItCouldUse) {
+  const SkyFit plain = fit_one(panorama_of(clear_sky(), {}));
+  EXPECT_GT(plain.sky.inlier_share, 0.95);
+  // A quarter of the sky, as bright as the rest along its edges, is not as the model has it.
+  SkyPicture odd = panorama_of(clear_sky(), {});
+  for (int y = 0; y < 75; ++y)
+    for (int x = 0; x < 90; ++x)
+      for (int c = 0; c < 3; ++c)
+        odd.rgb.pixel(x, y)[c] *=
+            1 + 0.8f * static_cast<float>(std::sin(kPi * x / 90) * std::sin(kPi * y / 75));
+  const double share = fit_one(odd).sky.inlier_share;
+  EXPECT_LT(share, 0.95);
+  EXPECT_GT(share, 0.6);
 }
 
 TEST(FitSky, AnUnknownSunLeavesGradation) {

@@ -12,6 +12,10 @@ namespace {
 constexpr double kNearSunDeg = 3, kGlareDeg = 10;
 constexpr double kBorneOut = 0.8;   ///< share of the surest region that must pass a mask for it to be used
 constexpr double kSureShare = 0.1;  ///< of the surest region's area: others need not be doubted
+/// Share of what is seen above the middle of a clipped patch that is the patch: below it, it is a wall that
+/// shines.
+constexpr double kHighUp = 0.25;
+constexpr double kGoesOn = 0.5;  ///< of the level that clips, beside clipped sky
 constexpr double kLeastRegion =
     0.0015;  ///< steradians: smaller regions are windows and gaps (5 square degrees)
 
@@ -60,7 +64,7 @@ class Masking {
   void mask_facet(int f) {
     const FacetLight& facet = light_.facets[f];
     const double light = luminance(facet.mean);
-    const bool clipped = facet.clipped > 0.1 * (facet.weight + facet.clipped);
+    const bool clipped = clipped_share(facet) > kClippedShare;
     const bool below = sphere_.centre(f).z() <= std::sin(options_.lowest_elevation_deg * kDegree);
     out_.unusable[f] =
         below || clipped || facet.coverage < options_.least_coverage || !(facet.mean.minCoeff() > 0);
@@ -71,14 +75,13 @@ class Masking {
   }
 
   bool known_by_hand() {
-    double known = 0;
-    for (const FacetLight& facet : light_.facets) known += facet.known_sky;
-    if (!(known > 0)) return false;
+    if (light_.masked_by_hand == 0) return false;
     for (int f = 0; f < sphere_.count(); ++f) {
       const FacetLight& facet = light_.facets[f];
-      out_.sky[f] =
-          !out_.unusable[f] && !out_.near_sun[f] && facet.known_sky > 0.9 * (facet.weight + facet.clipped);
+      out_.sky[f] = !out_.unusable[f] && !out_.near_sun[f] && is_known_sky(facet);
+      if (!out_.near_sun[f] && white(f) && is_known_sky(facet)) out_.white.push_back(f);
     }
+    out_.by_hand = true;
     out_.reason = "masks by hand say what is sky";
     return true;
   }
@@ -121,12 +124,63 @@ class Masking {
     return r.height * (0.1 + r.blue / r.area) * (0.1 + r.bright / r.area);
   }
 
+  bool white(int f) const {
+    return sphere_.centre(f).z() > std::sin(options_.lowest_elevation_deg * kDegree) && !out_.near_sun[f] &&
+           light_.facets[f].coverage >= options_.least_coverage &&
+           clipped_share(light_.facets[f]) > kClippedShare;
+  }
+
+  /// The clipped patch with most height, if it is higher up than what else is seen.
+  Region highest_white() const {
+    std::vector<std::uint8_t> taken(light_.facets.size());
+    Region best;
+    for (int seed = 0; seed < sphere_.count(); ++seed) {
+      if (taken[seed] || !white(seed)) continue;
+      Region region{{seed}};
+      taken[seed] = 1;
+      for (std::size_t i = 0; i < region.facets.size(); ++i)
+        for (const int next : sphere_.neighbours(region.facets[i]))
+          if (!taken[next] && white(next)) taken[next] = 1, region.facets.push_back(next);
+      measure(region);
+      if (region.height > best.height) best = std::move(region);
+    }
+    return best.area > 0 && high_up(best) ? best : Region{};
+  }
+
+  bool high_up(const Region& region) const {
+    double here = 0, all = 0;
+    for (const int f : region.facets)
+      if (sphere_.centre(f).z() > region.height / region.area) here += sphere_.solid_angle(f);
+    for (int f = 0; f < sphere_.count(); ++f)
+      if (sphere_.centre(f).z() > region.height / region.area &&
+          light_.facets[f].coverage >= options_.least_coverage)
+        all += sphere_.solid_angle(f);
+    return here > kHighUp * all;
+  }
+
+  /// Where the sky clips, what is smooth below it is sky only if it goes on from there.
+  void keep_what_touches_white() {
+    std::vector<double> clip_beside(light_.facets.size(), std::numeric_limits<double>::infinity());
+    for (const int f : out_.white)
+      for (const int next : sphere_.neighbours(f)) clip_beside[next] = light_.facets[f].clip;
+    std::erase_if(regions_, [&](const Region& region) {
+      return std::none_of(region.facets.begin(), region.facets.end(),
+                          [&](int f) { return light_.facets[f].mean.maxCoeff() > kGoesOn * clip_beside[f]; });
+    });
+  }
+
   void choose() {
+    Region white = highest_white();
+    if (std::none_of(regions_.begin(), regions_.end(),
+                     [&](const Region& region) { return region.height >= white.height; })) {
+      out_.white = std::move(white.facets);
+      keep_what_touches_white();
+    }
     const Region* surest = nullptr;
     for (const Region& region : regions_)
       if (!surest || likeness(region) > likeness(*surest)) surest = &region;
     if (!surest) {
-      out_.reason = "nothing smooth above the horizon";
+      out_.reason = out_.white.empty() ? "nothing smooth above the horizon" : "what is high up clips";
       return;
     }
     out_.red_blue_share = surest->blue / surest->area;

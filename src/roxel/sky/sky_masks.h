@@ -30,12 +30,19 @@ struct SkyMasks {
   std::vector<std::uint8_t> sky;  ///< 1 = sky, as far as all of this says
   std::vector<std::vector<int>>
       apart;  ///< smooth regions that pass the masks in use, but are too small to be sure
+  /// Clipped facets that hang together, higher up than anything else: sky, brighter than the pictures can
+  /// say.
+  std::vector<int> white;
   double mean_luminance = 0;
   bool red_blue_used = false, luminance_used = false;
   double red_blue_share = 0;   ///< of the region that is surely sky: passes the red over blue mask
   double luminance_share = 0;  ///< of it: passes the luminance mask
+  bool by_hand = false;        ///< masks by hand say what is sky
   std::string reason;          ///< why masks are used or not
 };
+
+/// Share of a facet's light that must be clipped for its mean to say little.
+inline constexpr double kClippedShare = 0.1;
 
 /// `sun` (sky frame) where it is known. Where masks by hand say what is sky, they alone decide.
 SkyMasks sky_masks(const SphereLight& light, const std::optional<Eigen::Vector3d>& sun,

@@ -1,5 +1,6 @@
 #include "roxel/sky/sky_picture.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -66,6 +67,46 @@ double PixelRays::solid_angle(int x, int y) const {
   return pixel_solid_angle(std::get<PinholeCamera>(camera_).intrinsics, x, y);
 }
 
+namespace {
+
+PixelRange range_of(const Equirectangular& panorama, const Eigen::Vector3d& direction, double angle) {
+  const Eigen::Vector2d at = panorama.position(direction);
+  const double rows = angle / kPi * panorama.height;
+  PixelRange range{0, std::max(0, static_cast<int>(std::floor(at.y() - rows))), panorama.width,
+                   std::min(panorama.height, static_cast<int>(std::ceil(at.y() + rows)) + 1)};
+  // The circle's widest azimuth; around the zenith it is all of them.
+  const double widest = std::sin(angle) / std::max(1e-9, std::hypot(direction.x(), direction.y()));
+  const double columns = widest < 1 ? std::asin(widest) / (2 * kPi) * panorama.width : panorama.width;
+  if (2 * columns + 2 >= panorama.width) return range;
+  range.x0 = static_cast<int>(std::floor(at.x() - columns));
+  range.x1 = static_cast<int>(std::ceil(at.x() + columns)) + 1;
+  return range;
+}
+
+}  // namespace
+
+PixelRange PixelRays::around(const Eigen::Vector3d& direction, double angle) const {
+  if (const auto* panorama = std::get_if<Equirectangular>(&camera_))
+    return range_of(*panorama, direction, angle);
+  // A circle in front of the camera is an ellipse in the picture: its box is that of the points on it.
+  constexpr int kPoints = 32;
+  const Eigen::Vector3d right = direction.unitOrthogonal(), up = direction.cross(right);
+  Eigen::AlignedBox2d box;
+  for (int i = 0; i < kPoints; ++i) {
+    const double turn = 2 * kPi * i / kPoints;
+    const Eigen::Vector3d across = std::cos(turn) * right + std::sin(turn) * up;
+    const auto at = position(std::cos(angle) * direction + std::sin(angle) * across);
+    if (!at) return {0, 0, width_, height_};
+    box.extend(*at);
+  }
+  const Eigen::Array2d margin = (0.01 * box.sizes().array() + 1);  // between the points, and to pixel centres
+  const auto bounded = [](double value, int most) {
+    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(most)));
+  };
+  return {bounded(box.min().x() - margin.x(), width_), bounded(box.min().y() - margin.y(), height_),
+          bounded(box.max().x() + margin.x() + 1, width_), bounded(box.max().y() + margin.y() + 1, height_)};
+}
+
 double PixelRays::pixel_angle() const {
   if (std::holds_alternative<Equirectangular>(camera_)) return 2 * kPi / width_;
   const Intrinsics& k = std::get<PinholeCamera>(camera_).intrinsics;
@@ -73,13 +114,20 @@ double PixelRays::pixel_angle() const {
 }
 
 double clip_level(const Image& rgb) {
-  constexpr double kDisplayWhite = 1.0001, kJustBelowWhite = 0.985, kHalfEnd = 65000;
+  // No other value of half floats, and none of Radiance files, lies between 65 472 and their end at 65 504.
+  constexpr double kDisplayWhite = 1.0001, kJustBelowWhite = 0.985, kHalfEnd = 65000, kAtHalfEnd = 65473;
   constexpr int kShared = 4;
   float highest = 0;
   for (const float value : rgb.data()) highest = std::max(highest, value);
   if (highest <= kDisplayWhite) return kJustBelowWhite;
-  const auto sharing = std::count(rgb.data().begin(), rgb.data().end(), highest);
-  return sharing >= kShared ? 0.999 * highest : kHalfEnd;
+  int sharing = 0;
+  for (int y = 0; y < rgb.height(); ++y)
+    for (int x = 0; x < rgb.width(); ++x) {
+      const float* pixel = rgb.pixel(x, y);
+      sharing += std::find(pixel, pixel + rgb.channels(), highest) != pixel + rgb.channels();
+    }
+  if (sharing >= kShared) return 0.999 * highest;
+  return highest > kAtHalfEnd && highest < 65505 ? kHalfEnd : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace roxel

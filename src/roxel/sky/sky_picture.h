@@ -22,6 +22,12 @@ struct Equirectangular {
   Eigen::Vector2d position(const Eigen::Vector3d& direction) const;
 };
 
+/// Columns x0 to x1 - 1 of rows y0 to y1 - 1. Columns beyond the edges of a panorama are those of its other
+/// edge: take them modulo its width.
+struct PixelRange {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+};
+
 /// Directions of a picture's pixels.
 class PixelRays {
  public:
@@ -38,6 +44,9 @@ class PixelRays {
   /// Steradians of pixel (x, y): exact, but for pinhole cameras with skew, where it is that of the centre
   /// times the area.
   double solid_angle(int x, int y) const;
+  /// Holds all pixels whose centres look within `angle_rad` (below a quarter turn) of a direction, and
+  /// others.
+  PixelRange around(const Eigen::Vector3d& direction, double angle_rad) const;
   /// Edge of a pixel in the middle of the picture, radians.
   double pixel_angle() const;
 
@@ -56,8 +65,8 @@ struct SkyPicture {
   double clip = std::numeric_limits<double>::infinity();  ///< a channel of at least this is clipped
 };
 
-/// Where a picture clips: files whose values end at 1 do so just below 1; others at half float's end, or
-/// where several pixels share the highest value.
+/// Where a picture clips: files whose values end at 1 do so just below 1; others where several pixels share
+/// the highest value, or where that is half float's end, 65 504. Infinity where nothing says that it does.
 double clip_level(const Image& rgb);
 
 /// Rec. 709 luminance of linear red, green, blue.

@@ -8,9 +8,11 @@ namespace {
 
 /// Density of log colour of what is not sky: alike over a factor of 50 in brightness and of 4 in hue.
 constexpr double kElsewhere = 1 / (3.9 * 1.4 * 1.4);
-/// A pixel is not a facet's mean: noise, thin cloud and blur are added to the model's deviation.
-constexpr double kPixelSigma = 0.02;
-constexpr int kReach = 8;  ///< facets that a correction is carried
+/// A pixel is not a facet's mean: noise, thin cloud and blur are added to the model's deviation, at least
+/// this.
+constexpr double kLeastPixelSigma = 0.02, kMostPixelSigma = 0.1;
+constexpr int kReach = 8;                  ///< facets that a correction is carried
+constexpr double kAsGoodAsClipped = 0.75;  ///< of the clip level, for a model
 
 class PixelMasking {
  public:
@@ -18,7 +20,7 @@ class PixelMasking {
       : picture_(picture), fit_(fit), width_(picture.rays.width()), height_(picture.rays.height()) {}
 
   Mask take() {
-    find_corrections();
+    if (fit_.fitted.has_light()) find_corrections(), find_pixel_sigma();
     likeness_.assign(static_cast<std::size_t>(width_) * height_, 0.0f);
     facet_.assign(likeness_.size(), 0);
     for (int y = 0; y < height_; ++y)
@@ -44,7 +46,7 @@ class PixelMasking {
       known[f] |= fit_.beyond_model[f];
       if (!known[f]) continue;
       ring.push_back(f);
-      const Eigen::Vector3d model = fit_.sky.radiance_in_sky(sphere.centre(f));
+      const Eigen::Vector3d model = fit_.fitted.radiance_in_sky(sphere.centre(f));
       correction_[f] = (fit_.light.facets[f].mean.array() / model.array()).log().matrix();
     }
     for (int step = 0; step < kReach && !ring.empty(); ++step) {
@@ -63,6 +65,23 @@ class PixelMasking {
     }
   }
 
+  /// What pixels deviate by within the facets of the fit: the median.
+  void find_pixel_sigma() {
+    for (int c = 0; c < 3; ++c) {
+      std::vector<double> deviations;
+      for (std::size_t f = 0; f < fit_.used.size(); ++f)
+        if (const FacetLight& facet = fit_.light.facets[f]; fit_.used[f] && facet.pixels > 1)
+          deviations.push_back(std::sqrt(facet.variance[c]) / facet.mean[c]);
+      double middle = 0;
+      if (!deviations.empty()) {
+        const auto at = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+        std::nth_element(deviations.begin(), at, deviations.end());
+        middle = *at;
+      }
+      pixel_sigma_[c] = std::clamp(middle, kLeastPixelSigma, kMostPixelSigma);
+    }
+  }
+
   /// Posterior of sky by colour alone.
   void look(int x, int y) {
     if (!picture_.valid.empty() && picture_.valid.at(x, y) != 255) return;
@@ -71,16 +90,18 @@ class PixelMasking {
     const FacetSphere& sphere = *fit_.light.sphere;
     if (!sphere.contains(last_facet_, direction)) last_facet_ = sphere.facet_at(direction);
     facet_[at(x, y)] = last_facet_;
+    if (fit_.clipped_sky[last_facet_] && clips(x, y)) likeness_[at(x, y)] = 1;
+    if (!fit_.fitted.has_light() || likeness_[at(x, y)] == 1) return;
     if (fit_.masks.near_sun[last_facet_] && shines(x, y)) {
       likeness_[at(x, y)] = 1;
       return;
     }
     const Eigen::Vector3d model =
-        (fit_.sky.radiance_in_sky(direction).array() * correction_[last_facet_].array().exp()).matrix();
+        (fit_.fitted.radiance_in_sky(direction).array() * correction_[last_facet_].array().exp()).matrix();
     double exponent = 0, density = 1;
     for (int c = 0; c < 3; ++c) {
       const double unrest = fit_.beyond_model[last_facet_] ? fit_.light.facets[last_facet_].contrast : 0;
-      const double sigma = std::hypot(fit_.sky.relative_sigma[c], kPixelSigma, unrest);
+      const double sigma = std::hypot(fit_.fitted.relative_sigma[c], pixel_sigma_[c], unrest);
       const double error = log_error(picture_.rgb.pixel(x, y)[c], model[c]) / sigma;
       exponent += 0.5 * error * error;
       density /= std::sqrt(2 * M_PI) * sigma;
@@ -91,17 +112,23 @@ class PixelMasking {
 
   /// A clipped pixel says "at least this".
   double log_error(double seen, double model) const {
-    if (seen >= picture_.clip && model >= picture_.clip) return 0;
+    if (seen >= picture_.clip && model >= kAsGoodAsClipped * picture_.clip) return 0;
     return std::log(std::max(seen, 1e-6 * model) / std::max(model, 1e-30));
+  }
+
+  bool clips(int x, int y) const {
+    const float* rgb = picture_.rgb.pixel(x, y);
+    return std::max({rgb[0], rgb[1], rgb[2]}) >= picture_.clip;
   }
 
   bool shines(int x, int y) const {
     const Eigen::Vector3d seen = Eigen::Vector3f(picture_.rgb.pixel(x, y)).cast<double>();
     return luminance(seen) >=
-           0.7 * luminance(fit_.sky.radiance_in_sky(picture_.rays.direction(x + 0.5, y + 0.5)));
+           0.7 * luminance(fit_.fitted.radiance_in_sky(picture_.rays.direction(x + 0.5, y + 0.5)));
   }
 
-  /// Reaches from pixels in facets of the fit to all that look like sky: windows hang in walls.
+  /// Reaches from pixels in facets of the fit and clipped ones of the sky to all that look like sky: windows
+  /// hang in walls.
   void grow() {
     reached_.assign(likeness_.size(), 0);
     std::vector<std::size_t> queue;
@@ -111,7 +138,9 @@ class PixelMasking {
       if (likeness_[i] > 0.5f) queue.push_back(i);
     };
     for (std::size_t i = 0; i < likeness_.size(); ++i)
-      if (likeness_[i] > 0.5f && (fit_.used[facet_[i]] || fit_.beyond_model[facet_[i]])) reach(i);
+      if (likeness_[i] > 0.5f &&
+          (fit_.used[facet_[i]] || fit_.beyond_model[facet_[i]] || fit_.clipped_sky[facet_[i]]))
+        reach(i);
     for (std::size_t n = 0; n < queue.size(); ++n) {
       const int x = static_cast<int>(queue[n] % width_), y = static_cast<int>(queue[n] / width_);
       for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}})
@@ -123,30 +152,17 @@ class PixelMasking {
   const SkyFit& fit_;
   int width_, height_, last_facet_ = 0;
   std::vector<Eigen::Vector3d> correction_;
+  Eigen::Vector3d pixel_sigma_ = Eigen::Vector3d::Zero();
   std::vector<float> likeness_;
   std::vector<int> facet_;
   std::vector<std::uint8_t> reached_;
 };
 
-/// Where nothing of the sky is left to fit: what clips in facets that clip for the most part.
-Mask clipped_mask(const SkyPicture& picture, const SkyFit& fit) {
-  Mask mask(picture.rays.width(), picture.rays.height(), 0);
-  for (int y = 0; y < mask.height(); ++y)
-    for (int x = 0; x < mask.width(); ++x) {
-      const float* rgb = picture.rgb.pixel(x, y);
-      const Eigen::Vector3d direction = picture.rays.direction(x + 0.5, y + 0.5);
-      if (direction.z() < 0 || std::max({rgb[0], rgb[1], rgb[2]}) < picture.clip) continue;
-      const FacetLight& facet = fit.light.facets[fit.light.sphere->facet_at(direction)];
-      if (facet.clipped > facet.weight) mask.at(x, y) = 255;
-    }
-  return mask;
-}
-
 }  // namespace
 
 Mask soft_sky_mask(const SkyPicture& picture, const SkyFit& fit) {
-  if (fit.sky.fallback == kClippedSky) return clipped_mask(picture, fit);
-  if (!fit.sky.has_light()) return Mask(picture.rays.width(), picture.rays.height(), 0);
+  const bool clips = std::find(fit.clipped_sky.begin(), fit.clipped_sky.end(), 1) != fit.clipped_sky.end();
+  if (!fit.fitted.has_light() && !clips) return Mask(picture.rays.width(), picture.rays.height(), 0);
   return PixelMasking(picture, fit).take();
 }
 

@@ -16,6 +16,8 @@ void SphereLightSum::add(const SkyPicture& picture) {
   for (int y = 0; y < picture.rays.height(); ++y)
     for (int x = 0; x < picture.rays.width(); ++x)
       if (picture.valid.empty() || picture.valid.at(x, y) == 255) add_pixel(picture, x, y, samples);
+  ++pictures_;
+  if (!picture.known_sky.empty()) ++masked_by_hand_;
   fold();
 }
 
@@ -34,16 +36,19 @@ void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y, int samp
       sum.peak = std::max(sum.peak, light);
       sum.bright += light * weight * d;
       sum.known_sky += known * weight;
+      if (!picture.known_sky.empty()) sum.judged += weight;
       sum.open += open * weight;
       if (clipped) {
         sum.clipped += weight;
+        sum.clipped_first += weight * rgb;
+        sum.clip = picture.clip;
         continue;
       }
       sum.weight += weight;
       sum.first += weight * rgb;
       sum.second += weight * rgb.cwiseProduct(rgb);
       sum.luminance_second += weight * light * light;
-      ++sum.pixels;
+      sum.pixels += 1.0 / (samples * samples);
     }
 }
 
@@ -53,6 +58,9 @@ void SphereLightSum::fold() {
     Total& total = total_[f];
     total.weight += sum.weight;
     total.clipped += sum.clipped;
+    total.clipped_first += sum.clipped_first;
+    if (sum.clip > 0) total.clip = total.clip > 0 ? std::min(total.clip, sum.clip) : sum.clip;
+    total.judged += sum.judged;
     total.known_sky += sum.known_sky;
     total.open += sum.open;
     total.pixels += sum.pixels;
@@ -76,12 +84,15 @@ void SphereLightSum::fold() {
 }
 
 SphereLight SphereLightSum::result() const {
-  SphereLight light{sphere_, std::vector<FacetLight>(total_.size())};
+  SphereLight light{sphere_, std::vector<FacetLight>(total_.size()), pictures_, masked_by_hand_};
   for (std::size_t f = 0; f < total_.size(); ++f) {
     const Total& total = total_[f];
     FacetLight& facet = light.facets[f];
     facet.weight = total.weight;
     facet.clipped = total.clipped;
+    if (total.clipped > 0) facet.clipped_mean = total.clipped_first / total.clipped;
+    facet.clip = total.clip;
+    facet.judged = total.judged;
     facet.known_sky = total.known_sky;
     facet.open = total.open;
     facet.coverage = total.coverage;

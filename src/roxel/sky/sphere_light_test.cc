@@ -99,14 +99,56 @@ TEST(PixelRays, PanoramasHaveNorthInTheMiddleAndEastToTheRight) {
   EXPECT_LT((frame.direction(123, 0) - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
 }
 
+TEST(PixelRays, RangesHoldAllThatLooksNearADirection) {
+  const Eigen::Matrix3d same = Eigen::Matrix3d::Identity();
+  const PinholeCamera wide = camera(90, 60, 25);  // corners 65 degrees off
+  for (const PixelRays& rays : {PixelRays(Equirectangular{120, 60}), PixelRays(wide, same)})
+    for (const SunPosition at :
+         {SunPosition{180, 40}, {179, 5}, {-179, 60}, {0, 89}, {30, -88}, {330, 70}, {40, 20}})
+      for (const double angle : {0.03, 0.2}) {
+        const Eigen::Vector3d d = sun_direction(at);
+        const PixelRange range = rays.around(d, angle);
+        EXPECT_LE(range.x1 - range.x0, rays.width());
+        std::vector<bool> held(static_cast<std::size_t>(rays.width()) * rays.height());
+        for (int y = range.y0; y < range.y1; ++y)
+          for (int x = range.x0; x < range.x1; ++x)
+            held[static_cast<std::size_t>(y) * rays.width() + (x + rays.width()) % rays.width()] = true;
+        for (int y = 0; y < rays.height(); ++y)
+          for (int x = 0; x < rays.width(); ++x)
+            if (rays.direction(x + 0.5, y + 0.5).dot(d) > std::cos(angle)) {
+              EXPECT_TRUE(held[static_cast<std::size_t>(y) * rays.width() + x])
+                  << at.azimuth_deg << " " << x << " " << y;
+            }
+      }
+}
+
 TEST(ClipLevel, IsJustBelowWhiteForDisplayedAndTheTopOfRadianceForOthers) {
   Image image(4, 4, 3, 0.3f);
   image.pixel(1, 1)[0] = 1.0f;
   EXPECT_NEAR(clip_level(image), 0.985, 1e-9);
   image.pixel(1, 1)[0] = 800;
-  EXPECT_GT(clip_level(image), 60000);
+  EXPECT_EQ(clip_level(image), std::numeric_limits<double>::infinity());
   for (int x = 0; x < 4; ++x) image.pixel(x, 2)[1] = 900;
   EXPECT_NEAR(clip_level(image), 899.1, 0.01);
+}
+
+TEST(ClipLevel, IsTheEndOfHalfFloatsOnlyWhereTheyEnd) {
+  Image image(4, 4, 3, 0.3f);
+  image.pixel(1, 1)[0] = 65504;
+  EXPECT_EQ(clip_level(image), 65000);
+  for (const float peak : {65280.0f, 69120.0f, 80000.0f}) {  // of Radiance files
+    image.pixel(1, 1)[0] = peak;
+    EXPECT_EQ(clip_level(image), std::numeric_limits<double>::infinity()) << peak;
+  }
+}
+
+TEST(ClipLevel, CountsPixelsNotChannels) {
+  Image image(4, 4, 3, 0.3f);
+  for (int x = 0; x < 3; ++x)  // a flat grey disc: nine values, three pixels
+    for (int c = 0; c < 3; ++c) image.pixel(x, 1)[c] = 5000;
+  EXPECT_EQ(clip_level(image), std::numeric_limits<double>::infinity());
+  image.pixel(3, 1)[2] = 5000;
+  EXPECT_NEAR(clip_level(image), 4995, 0.01);
 }
 
 SphereLight light_of(const std::vector<SkyPicture>& pictures, int level = 3) {
@@ -149,6 +191,26 @@ TEST(SphereLight, AveragesPicturesAndReportsTheirDisagreement) {
   EXPECT_NEAR(light.facets[inside].variance[0], 1, 1e-9);
 }
 
+TEST(SphereLight, CountsAPixelOnceHoweverFineFacetsAre) {
+  for (const int level : {2, 5}) {
+    double pixels = 0;
+    for (const FacetLight& facet : light_of({plain(1)}, level).facets) pixels += facet.pixels;
+    EXPECT_NEAR(pixels, 60 * 40, 1e-6) << level;
+  }
+}
+
+TEST(SphereLight, KnowsWhatMasksByHandSayWhereOnlySomePicturesHaveOne) {
+  SkyPicture sky = plain(1);
+  sky.known_sky = Mask(60, 40, 255);
+  const SphereLight light = light_of({plain(1), sky, plain(1)});
+  EXPECT_EQ(light.pictures, 3);
+  EXPECT_EQ(light.masked_by_hand, 1);
+  EXPECT_TRUE(is_known_sky(light.facets[light.sphere->facet_at(sky.rays.direction(30, 20))]));
+  sky.known_sky = Mask(60, 40, 0);
+  const SphereLight none = light_of({plain(1), sky});
+  EXPECT_FALSE(is_known_sky(none.facets[none.sphere->facet_at(sky.rays.direction(30, 20))]));
+}
+
 TEST(SphereLight, LeavesClippedPixelsOutOfMeans) {
   SkyPicture picture = plain(0.5f);
   for (int y = 0; y < 40; ++y)
@@ -158,6 +220,10 @@ TEST(SphereLight, LeavesClippedPixelsOutOfMeans) {
   double clipped = 0, weight = 0;
   for (const FacetLight& facet : light.facets) {
     clipped += facet.clipped, weight += facet.weight;
+    if (facet.clipped > 0) {
+      EXPECT_EQ(facet.clip, 0.985);
+      EXPECT_LT((facet.clipped_mean - Eigen::Vector3d(0.5, 0.5, 1)).norm(), 1e-6);
+    }
     if (facet.weight > 0) {
       EXPECT_NEAR(facet.mean[2], 0.5, 1e-6);
     }
@@ -201,6 +267,43 @@ TEST(MeasureSun, SumsTheDiscWithoutTheSkyAroundIt) {
   ASSERT_TRUE(measured.in_view);
   EXPECT_TRUE(measured.shines);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(measured.irradiance[c] / sky.sun_irradiance[c], 1, 0.02);
+}
+
+TEST(MeasureSun, IsTheSameAtTheSeamAndNearTheZenith) {
+  for (const SunPosition at :
+       {SunPosition{180, 40}, {179, 40}, {181, 40}, {0, 40}, {150, 75}, {150, 85}, {180, 85}, {20, 89.5}}) {
+    const NodeSky sky = clear_sky(at.azimuth_deg, at.elevation_deg);
+    const SunMeasure measured = measure_sun(panorama_of(sky, {}), sky.sun);
+    ASSERT_TRUE(measured.in_view) << at.azimuth_deg << " " << at.elevation_deg;
+    EXPECT_TRUE(measured.shines && !measured.clipped);
+    EXPECT_NEAR(measured.irradiance[1] / sky.sun_irradiance[1], 1, 0.03)
+        << at.azimuth_deg << " " << at.elevation_deg;
+  }
+}
+
+TEST(MeasureSun, TakesAPeakBeyondHalfFloatsAsItIs) {
+  NodeSky sky = clear_sky();
+  sky.sun_irradiance *= 80;  // a few pixels of a disc
+  const SkyPicture picture = panorama_of(sky, {});
+  const auto peak = std::max_element(picture.rgb.data().begin(), picture.rgb.data().end());
+  SkyPicture brighter = picture;
+  for (float& value : brighter.rgb.data()) value *= 80000 / *peak;
+  brighter.clip = clip_level(brighter.rgb);
+  const SunMeasure measured = measure_sun(brighter, sky.sun);
+  EXPECT_FALSE(measured.clipped);
+  EXPECT_NEAR(measured.irradiance[1] / (sky.sun_irradiance[1] * 80000 / *peak), 1, 0.03);
+}
+
+TEST(MeasureSun, SeesItInTheCornerOfAWidePicture) {
+  const PinholeCamera wide = camera(300, 200, 90);
+  SkyPicture picture{Image(300, 200, 3, 0.01f), {}, {}, PixelRays(wide, Eigen::Matrix3d::Identity())};
+  const Eigen::Vector3d sun = picture.rays.direction(255, 40);  // 53 degrees off the axis
+  for (int y = 30; y < 50; ++y)
+    for (int x = 245; x < 265; ++x)
+      if (picture.rays.direction(x + 0.5, y + 0.5).dot(sun) > std::cos(0.02))
+        picture.rgb.pixel(x, y)[1] = 100;
+  EXPECT_TRUE(measure_sun(picture, sun).in_view);
+  EXPECT_TRUE(measure_sun(picture, sun).shines);
 }
 
 TEST(MeasureSun, SaysWhereItIsHidden) {

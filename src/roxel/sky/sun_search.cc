@@ -27,13 +27,16 @@ double median_luminance(const SphereLight& light) {
 
 bool is_clipped(const FacetLight& facet) { return facet.clipped > facet.weight; }
 
-/// The facets that hang together with `seed` and are clipped; `seen` remembers them.
-std::vector<int> clipped_patch(const SphereLight& light, int seed, std::vector<bool>& seen) {
+bool holds_clipped(const FacetLight& facet) { return facet.clipped > 0; }
+
+/// The facets that hang together with `seed` and clip; `seen` remembers them.
+std::vector<int> clipped_patch(const SphereLight& light, int seed, bool (*clips)(const FacetLight&),
+                               std::vector<bool>& seen) {
   std::vector<int> patch{seed};
   seen[seed] = true;
   for (std::size_t i = 0; i < patch.size(); ++i)
     for (const int next : light.sphere->neighbours(patch[i]))
-      if (!seen[next] && is_clipped(light.facets[next])) seen[next] = true, patch.push_back(next);
+      if (!seen[next] && clips(light.facets[next])) seen[next] = true, patch.push_back(next);
   return patch;
 }
 
@@ -55,7 +58,7 @@ std::optional<FoundSun> find_clipped_sun(const SphereLight& light) {
   std::size_t best_size = 0;
   for (int f = 0; f < light.sphere->count(); ++f) {
     if (seen[f] || !is_clipped(light.facets[f])) continue;
-    const std::vector<int> patch = clipped_patch(light, f, seen);
+    const std::vector<int> patch = clipped_patch(light, f, is_clipped, seen);
     const FoundSun sun = sun_of_patch(light, patch);
     if (sun.radius_deg > kWidestPatchDeg || sun.direction.z() < kLowestSunSine || patch.size() <= best_size)
       continue;
@@ -65,6 +68,23 @@ std::optional<FoundSun> find_clipped_sun(const SphereLight& light) {
 }
 
 }  // namespace
+
+std::vector<FoundSun> clipped_spots(const SphereLight& light) {
+  std::vector<bool> seen(light.facets.size());
+  std::vector<std::pair<std::size_t, FoundSun>> spots;
+  for (int f = 0; f < light.sphere->count(); ++f) {
+    if (seen[f] || !holds_clipped(light.facets[f])) continue;
+    const std::vector<int> patch = clipped_patch(light, f, holds_clipped, seen);
+    const FoundSun spot = sun_of_patch(light, patch);
+    if (spot.radius_deg <= kWidestPatchDeg && spot.direction.z() >= kLowestSunSine)
+      spots.emplace_back(patch.size(), spot);
+  }
+  std::stable_sort(spots.begin(), spots.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<FoundSun> sorted;
+  for (const auto& spot : spots) sorted.push_back(spot.second);
+  return sorted;
+}
 
 std::optional<FoundSun> find_sun(const SphereLight& light) {
   const double median = median_luminance(light);
@@ -94,25 +114,20 @@ std::optional<FoundSun> find_sun(const SphereLight& light) {
 
 SunMeasure measure_sun(const SkyPicture& picture, const Eigen::Vector3d& sun) {
   SunMeasure measure;
-  const double radius = std::max(1.2 * kDegree, 4 * picture.rays.pixel_angle());
-  const auto at = picture.rays.position(sun);
-  const double reach = 2.5 * radius / picture.rays.pixel_angle() * 1.5;
-  if (!at || at->x() < 0 || at->y() < 0 || at->x() >= picture.rays.width() ||
-      at->y() >= picture.rays.height())
-    return measure;
-  const int x0 = std::max(0, static_cast<int>(at->x() - reach)),
-            y0 = std::max(0, static_cast<int>(at->y() - reach));
-  const int x1 = std::min(picture.rays.width(), static_cast<int>(at->x() + reach) + 1);
-  const int y1 = std::min(picture.rays.height(), static_cast<int>(at->y() + reach) + 1);
+  const PixelRays& rays = picture.rays;
+  const double radius = std::max(1.2 * kDegree, 4 * rays.pixel_angle());
+  const auto at = rays.position(sun);
+  if (!at || at->x() < 0 || at->y() < 0 || at->x() > rays.width() || at->y() > rays.height()) return measure;
+  const PixelRange range = rays.around(sun, 2 * radius);
   double inner = 0, ring = 0, peak = 0;
   Eigen::Vector3d inner_light = Eigen::Vector3d::Zero(), ring_light = Eigen::Vector3d::Zero();
-  for (int y = y0; y < y1; ++y)
-    for (int x = x0; x < x1; ++x) {
-      const double angle =
-          std::acos(std::clamp(picture.rays.direction(x + 0.5, y + 0.5).dot(sun), -1.0, 1.0));
+  for (int y = range.y0; y < range.y1; ++y)
+    for (int column = range.x0; column < range.x1; ++column) {
+      const int x = (column + rays.width()) % rays.width();
+      const double angle = std::acos(std::clamp(rays.direction(x + 0.5, y + 0.5).dot(sun), -1.0, 1.0));
       if (angle > 2 * radius) continue;
       const Eigen::Vector3d rgb = Eigen::Vector3f(picture.rgb.pixel(x, y)).cast<double>();
-      const double weight = picture.rays.solid_angle(x, y);
+      const double weight = rays.solid_angle(x, y);
       if (angle < radius) {
         if (rgb.maxCoeff() >= picture.clip) measure.clipped = true;
         inner += weight, inner_light += weight * rgb, peak = std::max(peak, luminance(rgb));

@@ -19,6 +19,10 @@ struct FoundSun {
 /// across, and no pixel 12 times brighter than the median.
 std::optional<FoundSun> find_sun(const SphereLight& light);
 
+/// All clipped spots that are small enough to be the sun and its glare, however little of a facet they are;
+/// largest first.
+std::vector<FoundSun> clipped_spots(const SphereLight& light);
+
 /// What a picture tells of the light of a sun in a known direction.
 struct SunMeasure {
   bool in_view = false;  ///< with a margin of twice the radius that is summed over
