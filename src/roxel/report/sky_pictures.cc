@@ -13,11 +13,13 @@ namespace {
 constexpr float kUnseen = 0.15f, kNoError = 0.35f;
 constexpr float kDimmed = 0.5f;  ///< heat of facets that the fit did not use
 
-constexpr std::pair<const char*, const char*> kCaptions[] = {
-    {"seen", "as the images show it"}, {"variance", "too much contrast"},
-    {"red_blue", "not blue"},          {"luminance", "dark"},
-    {"used", "facets of the fit"},     {"fit", "fitted sky"},
-    {"error", "error of the fit (pale: not used)"}};
+constexpr std::pair<const char*, const char*> kCaptions[] = {{"seen", "as the images show it"},
+                                                             {"variance", "too much contrast"},
+                                                             {"red_blue", "not blue"},
+                                                             {"luminance", "dark"},
+                                                             {"used", "facets of the fit"},
+                                                             {"fit", "fitted sky"},
+                                                             {"error", "error of the fit (pale: not used)"}};
 
 std::string caption_of(const std::string& name, bool left_out) {
   for (const auto& [known, caption] : kCaptions)

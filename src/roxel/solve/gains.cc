@@ -51,35 +51,33 @@ PinholeCamera shrunk(const PinholeCamera& camera, int factor) {
   return small;
 }
 
-/// Mean of the block's pixels, per channel; false where one of them is unusable, background or clipped.
-bool block_mean(const Photograph& photo, float clipped, int factor, int x, int y,
-                std::array<double, 3>& mean) {
-  mean = {0, 0, 0};
-  for (int v = y * factor; v < (y + 1) * factor; ++v)
-    for (int u = x * factor; u < (x + 1) * factor; ++u) {
+/// Mean of the square's pixels, per channel; false where one of them is unusable, background or clipped.
+bool square_mean(const Photograph& photo, float clipped, int side, int x, int y, float* mean) {
+  std::array<double, 3> sum{0, 0, 0};
+  for (int v = y * side; v < (y + 1) * side; ++v)
+    for (int u = x * side; u < (x + 1) * side; ++u) {
       if (!photo.valid.empty() && photo.valid.at(u, v) < 255) return false;
       if (!photo.foreground.empty() && photo.foreground.at(u, v) < 255) return false;
       const float* pixel = photo.rgb.pixel(u, v);
       for (int c = 0; c < 3; ++c) {
         if (pixel[c] >= clipped) return false;
-        mean[c] += pixel[c] / (factor * factor);
+        sum[c] += pixel[c];
       }
     }
+  for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(sum[c] / (side * side));
   return true;
 }
 
 /// One view's, or nothing where it shows too little.
 std::optional<std::array<double, 3>> fit_view(const LatticeStack& stack,
                                               const std::vector<std::array<float, 3>>& colors,
-                                              const Dataset& dataset, int view_idx, const Photograph& photo,
-                                              const Scene& scene) {
-  const PinholeCamera& camera = dataset.views[view_idx].camera;
-  const int factor = std::max(1, std::max(camera.intrinsics.width, camera.intrinsics.height) / kSide);
+                                              const Dataset& dataset, int view_idx,
+                                              const PhotographSquares& photo, const Scene& scene) {
   RenderOptions box_alone;
   box_alone.surround = false;
-  const Rendering rendering = render(stack, colors, shrunk(camera, factor),
+  const Rendering rendering = render(stack, colors, shrunk(dataset.views[view_idx].camera, photo.side),
                                      view_range(scene, dataset, view_idx), box_alone, RunContext(1));
-  return log_gain(photo, rendering, factor, scene.exposure);
+  return log_gain(photo, rendering, scene.exposure);
 }
 
 /// Views under one sky have one gain: of few photographs of one place, each alone shows too little that
@@ -122,20 +120,38 @@ std::array<double, 3> common_scale(const std::vector<std::array<double, 3>>& log
 
 }  // namespace
 
-std::optional<std::array<double, 3>> log_gain(const Photograph& photo, const Rendering& rendering, int factor,
-                                              double exposure) {
+PhotographSquares squares_of(const Photograph& photo, int side, double exposure) {
   const float clipped = exposure == 1 ? kBrightest : std::numeric_limits<float>::infinity();
+  const int width = std::max(1, photo.rgb.width() / side), height = std::max(1, photo.rgb.height() / side);
+  PhotographSquares squares{side, Image(width, height, 3), Mask(width, height)};
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      squares.counted.at(x, y) = square_mean(photo, clipped, side, x, y, squares.rgb.pixel(x, y)) ? 255 : 0;
+  return squares;
+}
+
+const PhotographSquares& SmallPhotographs::operator()(int view_idx, double exposure) {
+  std::optional<PhotographSquares>& of_view = of_views_[view_idx];
+  if (!of_view) {
+    const View& view = dataset_.views[view_idx];
+    const Intrinsics& k = view.camera.intrinsics;
+    of_view = squares_of(load_(view), std::max(1, std::max(k.width, k.height) / kSide), exposure);
+  }
+  return *of_view;
+}
+
+std::optional<std::array<double, 3>> log_gain(const PhotographSquares& photo, const Rendering& rendering,
+                                              double exposure) {
   const float darkest = kDarkestPair * static_cast<float>(exposure);
   std::array<std::vector<double>, 3> ratios;
   for (int y = 0; y < rendering.opacity.height(); ++y)
     for (int x = 0; x < rendering.opacity.width(); ++x) {
       const float opacity = *rendering.opacity.pixel(x, y);
-      std::array<double, 3> seen;
-      if (opacity < kCovered || !block_mean(photo, clipped, factor, x, y, seen)) continue;
-      const float* rendered = rendering.rgb.pixel(x, y);
+      if (opacity < kCovered || photo.counted.at(x, y) == 0) continue;
+      const float *seen = photo.rgb.pixel(x, y), *rendered = rendering.rgb.pixel(x, y);
       for (int c = 0; c < 3; ++c)
         if (rendered[c] > darkest * opacity && seen[c] > 0)
-          ratios[c].push_back(std::log(seen[c] * opacity / rendered[c]));
+          ratios[c].push_back(std::log(static_cast<double>(seen[c]) * opacity / rendered[c]));
     }
   std::array<double, 3> gain;
   for (int c = 0; c < 3; ++c) {
@@ -153,8 +169,9 @@ struct LogGains {
   std::vector<char> fitted;
 };
 
-LogGains log_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
-                   const Scene& scene, const RunContext& context) {
+LogGains log_gains(const Volume& volume, SmallPhotographs& photographs, const Scene& scene,
+                   const RunContext& context) {
+  const Dataset& dataset = photographs.dataset();
   const LatticeStack stack(volume);
   const std::vector<std::array<float, 3>> colors = radiance_colors(volume, scene.transform, scene.exposure);
   const int views = static_cast<int>(dataset.views.size());
@@ -164,7 +181,7 @@ LogGains log_gains(const Volume& volume, const Dataset& dataset, const Photograp
     context.throw_if_cancelled();
     const int view = static_cast<int>(v);
     const std::array<float, 3> before = scene.light.of_view(view);
-    const auto gain = fit_view(stack, colors, dataset, view, load(dataset.views[view]), scene);
+    const auto gain = fit_view(stack, colors, dataset, view, photographs(view, scene.exposure), scene);
     fitted[view] = gain.has_value();
     for (int c = 0; c < 3; ++c) logs[view][c] = gain ? (*gain)[c] : std::log(static_cast<double>(before[c]));
   });
@@ -173,9 +190,9 @@ LogGains log_gains(const Volume& volume, const Dataset& dataset, const Photograp
 
 }  // namespace
 
-GainFit fit_gains(const Volume& volume, const Dataset& dataset, const PhotographLoader& load,
-                  const Scene& scene, const RunContext& context, GainScale held_to) {
-  auto [logs, fitted] = log_gains(volume, dataset, load, scene, context);
+GainFit fit_gains(const Volume& volume, SmallPhotographs& photographs, const Scene& scene,
+                  const RunContext& context, GainScale held_to) {
+  auto [logs, fitted] = log_gains(volume, photographs, scene, context);
   const int views = static_cast<int>(logs.size());
   const std::array<double, 3> scale = held_to == GainScale::kOfViews ? common_scale(logs, fitted, scene.light)
                                                                      : std::array<double, 3>{0, 0, 0};

@@ -97,6 +97,43 @@ TEST(AutoIllumination, IsAGainWherePhotographsDifferAndNothingWhereTheyDoNot) {
   EXPECT_TRUE(run(dataset, twice, options).summary.light.empty());  // too coarse to judge
 }
 
+TEST(SquaresOf, AreMeansOfWhatCountsAlone) {
+  Photograph photo;
+  photo.rgb = Image(7, 4, 3);  // three squares of two in a row; the last column is left over
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 7; ++x)
+      for (int c = 0; c < 3; ++c) photo.rgb.pixel(x, y)[c] = 0.1f * static_cast<float>(x) + 0.01f * c;
+  photo.rgb.pixel(5, 3)[1] = 1;  // clipped
+  photo.foreground = Mask(7, 4);
+  std::fill(photo.foreground.data().begin(), photo.foreground.data().end(), std::uint8_t{255});
+  photo.foreground.at(2, 0) = 254;
+  const PhotographSquares squares = squares_of(photo, 2, 1);
+  ASSERT_EQ(squares.rgb.width(), 3);
+  ASSERT_EQ(squares.rgb.height(), 2);
+  EXPECT_EQ(squares.counted.at(0, 0), 255);
+  EXPECT_EQ(squares.counted.at(1, 0), 0);
+  EXPECT_EQ(squares.counted.at(1, 1), 255);
+  EXPECT_EQ(squares.counted.at(2, 0), 255);
+  EXPECT_EQ(squares.counted.at(2, 1), 0);
+  EXPECT_NEAR(squares.rgb.pixel(1, 1)[0], 0.25, 1e-6);
+  EXPECT_NEAR(squares.rgb.pixel(0, 0)[2], 0.07, 1e-6);
+  EXPECT_EQ(squares_of(photo, 2, 20).counted.at(2, 1), 255);  // of photographs that do not clip at 1
+}
+
+TEST(SmallPhotographs, AreReadOnce) {
+  const Dataset dataset = cube_dataset(3, 48);
+  int reads = 0;
+  const PhotographLoader load = [&](const View& view) {
+    ++reads;
+    return lit_loader(dataset)(view);
+  };
+  SmallPhotographs small(dataset, load);
+  EXPECT_EQ(reads, 0);
+  for (int round = 0; round < 3; ++round)
+    for (int view = 0; view < 2; ++view) EXPECT_GT(small(view, 1).rgb.width(), 0);
+  EXPECT_EQ(reads, 2);
+}
+
 TEST(FitGains, FindsTheLightOfEveryPhotograph) {
   const Dataset dataset = cube_dataset(14, 48);
   const PhotographLoader load = lit_loader(dataset);

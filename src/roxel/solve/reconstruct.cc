@@ -123,9 +123,14 @@ Accelerate which_steps(const Scene& scene) {
 /// The samples of one level, made again when the light that is divided out has changed.
 class LevelSamples {
  public:
-  LevelSamples(const Dataset& dataset, const PhotographLoader& load, const ReconstructOptions& options,
-               const RunContext& context, double voxel_size)
-      : dataset_(dataset), load_(load), options_(options), context_(context), voxel_size_(voxel_size) {}
+  LevelSamples(const PhotographLoader& load, SmallPhotographs& small_photographs,
+               const ReconstructOptions& options, const RunContext& context, double voxel_size)
+      : dataset_(small_photographs.dataset()),
+        load_(load),
+        small_photographs_(small_photographs),
+        options_(options),
+        context_(context),
+        voxel_size_(voxel_size) {}
 
   void make(const Scene& scene) {
     samples_ = {};
@@ -153,7 +158,7 @@ class LevelSamples {
   /// Gains anew from the volume's canonical colours; returns whether they moved. Where they did not, the
   /// light stays the one that the samples were made in.
   bool fit_light(const Volume& volume, Scene& scene, LightRecord& record) {
-    GainFit fit = fit_gains(volume, dataset_, load_, scene, context_);
+    GainFit fit = fit_gains(volume, small_photographs_, scene, context_);
     record.fitted_views = fit.fitted_views;
     record.largest_change = fit.largest_change;
     record.spread = fit.spread;
@@ -183,6 +188,7 @@ class LevelSamples {
 
   const Dataset& dataset_;
   const PhotographLoader& load_;
+  SmallPhotographs& small_photographs_;
   const ReconstructOptions& options_;
   const RunContext& context_;
   double voxel_size_;
@@ -287,9 +293,9 @@ int level_to_judge_light(const Scene& scene, const ReconstructOptions& options) 
 
 /// What --illumination auto knows once there is a first volume: how far the photographs' brightness and
 /// tint are apart.
-void choose_gain(const Dataset& dataset, const PhotographLoader& load, const Volume& volume,
-                 const RunContext& context, int level, Scene& scene, Summary& summary) {
-  GainFit fit = fit_gains(volume, dataset, load, scene, context);
+void choose_gain(SmallPhotographs& photographs, const Volume& volume, const RunContext& context, int level,
+                 Scene& scene, Summary& summary) {
+  GainFit fit = fit_gains(volume, photographs, scene, context);
   const bool differs = fit.spread > kLightDiffers;
   char note[160];
   std::snprintf(note, sizeof note, "light: the images' gains differ by %.0f %% after level %d: %s",
@@ -322,6 +328,7 @@ class Levels {
          Reconstruction& made)
       : dataset_(dataset),
         load_(load),
+        small_photographs_(dataset, load),
         options_(options),
         context_(context),
         hooks_(hooks),
@@ -361,7 +368,7 @@ class Levels {
     const double earlier = state.level_seconds;
     const std::int64_t earlier_peak = state.level_peak_bytes;
     const double voxel_size = std::ldexp(made_.scene.voxel_size, options_.levels - state.level);
-    LevelSamples samples(dataset_, load_, options_, context_, voxel_size);
+    LevelSamples samples(load_, small_photographs_, options_, context_, voxel_size);
     samples.make(made_.scene);
     if (state.passes == 0) make_topology(state.level, samples.finest());
     Acceleration acceleration(made_.volume.slot_count(), options_.acceleration, which_steps(made_.scene));
@@ -398,14 +405,14 @@ class Levels {
     const auto start = Clock::now();
     const PeakMemory memory;
     Scene& scene = made_.scene;
-    const LevelSamples samples(dataset_, load_, options_, context_,
+    const LevelSamples samples(load_, small_photographs_, options_, context_,
                                std::ldexp(scene.voxel_size, options_.levels - state.level));
     if (state.level == options_.levels) {
       if (scene.light.by_normal) {
         made_.surface_light = samples.paint_by_normal(scene, *daylight_, made_.volume);
         if (scene.light.has_gains())  // of the colours as they now are, without shading
           scene.light.of_views =
-              fit_gains(made_.volume, dataset_, load_, scene, context_, GainScale::kOfVolume).of_views;
+              fit_gains(made_.volume, small_photographs_, scene, context_, GainScale::kOfVolume).of_views;
       } else if (scene.light.local_matching)
         samples.paint(scene, made_.volume);
       if (options_.fit_colors) fit_to_photographs();
@@ -413,7 +420,7 @@ class Levels {
     if (options_.illumination == IlluminationChoice::kAuto && scene.light.from == LightSource::kNone &&
         state.level == level_to_judge_light(scene, options_)) {
       if (scene.light.local_matching) samples.paint(scene, made_.volume);
-      choose_gain(dataset_, load_, made_.volume, context_, state.level, scene, made_.summary);
+      choose_gain(small_photographs_, made_.volume, context_, state.level, scene, made_.summary);
     }
     if (hooks_.look_at_skies_again && state.level == 1 && options_.levels > 1) look_at_skies_again();
     LevelRecord& record = made_.summary.levels.back();
@@ -446,6 +453,7 @@ class Levels {
   /// Other skies than those of the survey: views may have got a dome's light or a mask.
   void know_skies(Daylight daylight) {
     daylight_ = std::move(daylight);
+    small_photographs_.forget();
     Scene& scene = made_.scene;
     for (std::size_t v = 0; v < scene.light.of_dome.size(); ++v)
       scene.light.of_dome[v] = daylight_->of_view(static_cast<int>(v)) != nullptr;
@@ -464,6 +472,7 @@ class Levels {
 
   const Dataset& dataset_;
   const PhotographLoader& load_;
+  SmallPhotographs small_photographs_;  ///< of a run that fits gains
   const ReconstructOptions& options_;
   RunContext& context_;
   const ReconstructHooks& hooks_;
