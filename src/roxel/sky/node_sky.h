@@ -63,8 +63,8 @@ struct NodeSky {
   SunLight sun_light = SunLight::kNone;
   Eigen::Vector3d sun_irradiance = Eigen::Vector3d::Zero();  ///< on a surface that faces the sun
 
-  /// Standard deviation over mean of its luminance, as far as it is known: between the images that measure
-  /// it, or of the estimate.
+  /// Standard deviation over mean of its luminance: of the estimate, or what images that measure it differ
+  /// by.
   double sun_relative_sigma = 0;
 
   double mean_error = 0;     ///< mean of |model / seen - 1| over the facets used and channels

@@ -29,8 +29,8 @@ constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
 constexpr double kSurelySun = 30;  ///< contrast of a spot worth a warning: lamps and white walls have less
 constexpr double kGlare = 1.3;     ///< brightness beside a sun over that further away
-/// Of log sunlight, over nine skies (docs/results/sky.md); of one measurement.
-constexpr double kEstimatedSunSigma = 0.4, kMeasuredSunSigma = 0.02;
+/// Of log sunlight, over nine skies (docs/results/sky.md); of a measurement, at least.
+constexpr double kEstimatedSunSigma = 0.47, kMeasuredSunSigma = 0.02;
 /// Facets that clip: share of the clip level that a model must come to, and how far other channels may be
 /// off.
 constexpr double kAboutClips = 0.75, kClippedColor = 0.3;
@@ -413,22 +413,26 @@ class Fitting {
     sky().clearness_bin = known_sun() ? fit_perez(samples(), 1, sky().sun, fit).start : 0;
   }
 
-  /// Share of the ring around a direction, from `inner` to `outer` degrees, that is of the fit, and its mean
-  /// luminance.
+  /// Around a direction, from `inner` to `outer` degrees: the share that fit or masks took for sky, the share
+  /// of the fit alone, and the mean luminance of what is seen.
   struct Ring {
-    double used_share = 0, luminance = 0;
+    double sky_share = 0, used_share = 0, luminance = 0;
   };
   Ring ring_around(const Eigen::Vector3d& direction, double inner, double outer) const {
-    double around = 0, used = 0, light = 0;
+    Ring ring;
+    double around = 0, seen = 0;
     for (int f = 0; f < sphere_->count(); ++f) {
-      const double apart = angle_deg(sphere_->centre(f), direction);
+      const double apart = angle_deg(sphere_->centre(f), direction), area = sphere_->solid_angle(f);
       if (apart < inner || apart > outer) continue;
-      around += sphere_->solid_angle(f);
-      if (!out_.used[f]) continue;
-      used += sphere_->solid_angle(f);
-      light += sphere_->solid_angle(f) * luminance(out_.light.facets[f].mean);
+      around += area;
+      if (out_.used[f]) ring.used_share += area;
+      if (out_.used[f] || out_.masks.sky[f]) ring.sky_share += area;
+      if (out_.light.facets[f].weight > 0)
+        seen += area, ring.luminance += area * luminance(out_.light.facets[f].mean);
     }
-    return around > 0 && used > 0 ? Ring{used / around, light / used} : Ring{};
+    if (around > 0) ring.used_share /= around, ring.sky_share /= around;
+    if (seen > 0) ring.luminance /= seen;
+    return ring;
   }
 
   /// Whether facets around the sun were taken for sky: then nothing hides it.
@@ -472,14 +476,15 @@ class Fitting {
       const double off = luminance(m) / luminance(s.sun_irradiance) - 1;
       squares += off * off;
     }
-    s.sun_relative_sigma = measured.size() > 1 ? std::sqrt(squares / (count - 1) / count) : kMeasuredSunSigma;
+    s.sun_relative_sigma = std::max(kMeasuredSunSigma, std::sqrt(squares / std::max(1.0, count - 1)));
   }
 
-  /// Glare, darker further out, in facets of the fit: a sun, however little it stands out where white is 1.
+  /// Glare, darker further out, amid sky: a sun, however little it stands out where white is 1. The fit has
+  /// no glare where it does not know of that sun, so it need not have used the facets close by.
   bool glares(const FoundSun& found) const {
     const Ring near = ring_around(found.direction, found.radius_deg + 1, found.radius_deg + 5),
                far = ring_around(found.direction, found.radius_deg + 10, found.radius_deg + 20);
-    return near.used_share > 0.5 && far.used_share > 0 && near.luminance > kGlare * far.luminance;
+    return far.sky_share > 0.5 && near.luminance > kGlare * far.luminance;
   }
 
   /// Whether the bright spot of the images is a sun; one that glares comes before what is merely bright.

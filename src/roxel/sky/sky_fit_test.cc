@@ -334,20 +334,25 @@ TEST(FitSky, SunlightThatNoImageShowsIsEstimatedUnderClearSkiesAlone) {
 }
 
 TEST(FitSky, WhatCanBeDecidedGrowsWithTheFacets) {
-  // Regions end at every step of brightness: what is surely sky is little, until the fit lets others in.
-  Square square;
-  square.noise = 0.03f;
-  SkyFitOptions options;
-  options.masks.step_limit = 0.003;
-  const SkyFit fit = fit_one(panorama_of(clear_sky(), square), options, {});
+  // A net over the sky but for a hole of 18 degrees: its meshes wait for the fit, and then are most of it.
+  SkyPicture picture = panorama_of(clear_sky(), {});
+  const Eigen::Vector3d hole = sun_direction({330, 50});
+  for (int y = 0; y < 75; ++y)
+    for (int x = 0; x < 360; ++x)
+      if ((x % 8 == 0 || y % 8 == 0) &&
+          picture.rays.direction(x + 0.5, y + 0.5).dot(hole) < std::cos(9 * kDegree))
+        for (int c = 0; c < 3; ++c) picture.rgb.pixel(x, y)[c] *= 0.3f;
+  SkyTask task;
+  task.views = {"a"};
+  const SkyFit fit = fit_sky(task, [&](int) { return picture; }, {});
   double sure = 0;
   for (int f = 0; f < fit.light.sphere->count(); ++f)
     if (fit.masks.sky[f]) sure += fit.light.sphere->solid_angle(f) / (2 * kPi);
   ASSERT_LT(sure, 0.03);
-  EXPECT_GT(fit.sky.sky_share, 0.3);
+  EXPECT_GT(fit.sky.sky_share, 0.06);
   EXPECT_EQ(fit.sky.model, SkyModel::kPerez);
   EXPECT_EQ(fit.sky.fallback, "");
-  EXPECT_LT(dome_difference(fit.sky, clear_sky()), 0.05);
+  EXPECT_LT(dome_difference(fit.sky, clear_sky()), 0.1);
 }
 
 TEST(FitSky, SaysHowMuchOfWhatLooksLikeSkyItCouldUse) {
