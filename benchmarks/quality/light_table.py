@@ -36,8 +36,7 @@ class Choice:
 
 
 CHOICES = [Choice("none", "canonical"), Choice("gain", "canonical"), Choice("sky", "canonical"), Choice("none", "local"), Choice("gain", "local"),
-           Choice("sky", "local"), Choice("sky-normal", "local"), Choice("sky", "canonical", 0.25), Choice("gain", "canonical", 0.25),
-           Choice("sky", "local", 0.25)]
+           Choice("sky", "local"), Choice("sky-normal", "local"), Choice("sky", "local", 0.25)]
 LIT = Choice("sky-normal", "local")  # whose lights are measured side by side
 SETS = {"of all": "depth points", "by pixel": "depth points by pixel", "agreed on": "depth points that 2 views agree on", "sure": None}
 HEAD = """# Light
