@@ -73,8 +73,8 @@ a voxel (of all), each pixel a point (by pixel), of those that two views agree o
 DEBRIS = """
 ## Sky debris
 
-Voxels of an opacity of 0.04 or 0.3 and more that stand where no true surface is within a voxel, in percent of all such voxels, and of their summed opacity: *in the open*, nothing is above them; *before the
-sky*, some photograph shows nothing but sky through them.
+Voxels of an opacity of 0.04 or 0.3 and more that stand where no true surface is within a voxel, in percent of all such voxels, and of their summed opacity: *in the open*, nothing is above them;
+*above all*, they are higher than the highest roof; *before the sky*, some photograph shows nothing but sky all over them.
 """
 COST = """
 ## Cost
@@ -145,8 +145,8 @@ def f_scores(metrics, name):
 def debris_cells(metrics):
     cells = []
     for at in metrics.get("sky_debris", []):
-        cells += [f"{at['voxels']}", *(percent(at[kind][share], 2) for kind in ("in_the_open", "before_sky") for share in ("share", "share_of_opacity"))]
-    return cells or ["-"] * 10
+        cells += [f"{at['voxels']}", *(percent(at[kind][share], 2) for kind in ("in_the_open", "above_all", "before_sky") for share in ("share", "share_of_opacity"))]
+    return cells or ["-"] * 14
 
 
 def document(measured, costs, remarks=""):
@@ -163,7 +163,7 @@ def document(measured, costs, remarks=""):
     text += table(["light", "matching", "voxel", "within 0.5 m", "1 m", "2 m", *(cell for name in SETS for cell in (f"F {name}: 0.5 m", "1 m"))],
                   [choice_cells(c) + within(m) + [cell for name in SETS.values() for cell in f_scores(m, name)] for c, m in measured.items()])
     text += DEBRIS + "\n"
-    text += table(["light", "matching", "voxel", *(cell for a in ("0.04", "0.3") for cell in (f"voxels ≥ {a}", "in the open %", "of opacity %", "before the sky %", "of opacity %"))],
+    text += table(["light", "matching", "voxel", *(cell for a in ("0.04", "0.3") for cell in (f"voxels ≥ {a}", "in the open %", "of opacity %", "above all %", "of opacity %", "before the sky %", "of opacity %"))],
                   [choice_cells(c) + debris_cells(m) for c, m in measured.items()])
     text += COST.format(processors=os.cpu_count()) + "\n"
     text += table(["light", "matching", "voxel", "million voxels", "seconds", "GiB"],

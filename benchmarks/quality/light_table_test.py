@@ -22,7 +22,7 @@ def metrics(*lights):
     return {"light": list(lights), "color": None, "images": {"object": {"rms": 0.2}},
             "depth": {"methods": {"volume": {"share_within_units": {"0.5": 0.4, "1": 0.5, "2": 0.7}}}},
             "surfaces": [{"name": name, "within": within} for name, within in shares.items()],
-            "sky_debris": [{"opacity_threshold": a, "voxels": 4000, "in_the_open": part(0.02), "before_sky": part(0.001)} for a in (0.04, 0.3)]}
+            "sky_debris": [{"opacity_threshold": a, "voxels": 4000, "in_the_open": part(0.02), "above_all": part(0.0001), "before_sky": part(0.001)} for a in (0.04, 0.3)]}
 
 
 class Page(unittest.TestCase):

@@ -13,10 +13,25 @@
 namespace roxel {
 namespace {
 
-bool before_sky(const MeshRays& rays, const Eigen::Vector3d& x, std::span<const PinholeCamera> cameras) {
+bool before_sky(const MeshRays& rays, const Eigen::Vector3d& x, double voxel_size,
+                std::span<const PinholeCamera> cameras) {
   return std::any_of(cameras.begin(), cameras.end(), [&](const PinholeCamera& camera) {
-    return in_image(camera, x) && !rays.trace(camera.pose.centre, x - camera.pose.centre);
+    const auto misses = [&](const Eigen::Vector3d& at) {
+      return !rays.trace(camera.pose.centre, at - camera.pose.centre);
+    };
+    if (!in_image(camera, x) || !misses(x)) return false;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3d side(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5);
+      if (!misses(x + voxel_size * side)) return false;
+    }
+    return true;
   });
+}
+
+double highest(const Mesh& surface, const Eigen::Vector3d& up) {
+  double height = -std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& point : surface.points) height = std::max(height, up.dot(point));
+  return height;
 }
 
 void add(VoxelSum& sum, float opacity) {
@@ -34,13 +49,15 @@ std::vector<SkyStand> sky_stands(const Mesh& surface, std::span<const Eigen::Vec
   const SurfaceDistance distance(surface);
   const MeshRays rays(surface);
   const double limit = std::nextafter(options.clearance, std::numeric_limits<double>::infinity());
+  const double top = highest(surface, options.up);
   std::vector<SkyStand> stands(places.size());
   parallel_for_blocks(
       static_cast<std::int64_t>(places.size()), kGrain, threads,
       [&](std::int64_t begin, std::int64_t end, int) {
         for (std::int64_t i = begin; i < end; ++i)
           if (std::isinf(distance(places[i], limit)))
-            stands[i] = {!rays.trace(places[i], options.up), before_sky(rays, places[i], cameras)};
+            stands[i] = {!rays.trace(places[i], options.up), options.up.dot(places[i]) > top,
+                         before_sky(rays, places[i], options.voxel_size, cameras)};
       });
   return stands;
 }
@@ -61,6 +78,7 @@ SkyDebris sky_debris(std::span<const float> opacity, std::span<const SkyStand> s
     if (opacity[i] < static_cast<float>(opacity_threshold)) continue;
     add(debris.all, opacity[i]);
     if (stands[i].in_the_open) add(debris.in_the_open, opacity[i]);
+    if (stands[i].above_all) add(debris.above_all, opacity[i]);
     if (stands[i].before_sky) add(debris.before_sky, opacity[i]);
   }
   return debris;

@@ -27,7 +27,7 @@ PinholeCamera looking_along_x() {
 
 std::vector<SkyStand> stands(const std::vector<Vector3d>& places, double clearance = 0.5, int threads = 1) {
   return sky_stands(roof_over_ground(), places, std::vector{looking_along_x()},
-                    {Vector3d::UnitZ(), clearance}, threads);
+                    {Vector3d::UnitZ(), clearance, 0.2}, threads);
 }
 
 TEST(SkyDebris, WhatHasARoofAboveIsNotInTheOpen) {
@@ -43,9 +43,23 @@ TEST(SkyDebris, WhatIsWithinTheClearanceIsSurface) {
   EXPECT_TRUE(stands({{2, 2, 2.51}}, 0.5)[0].in_the_open);
 }
 
+TEST(SkyDebris, AboveAllIsHigherThanTheHighestRoof) {
+  const auto found = stands({{2, 2, 2.6}, {-8, 2, 2.6}, {-8, 2, 1.9}, {2, 2, 2.4}});
+  EXPECT_TRUE(found[0].above_all);
+  EXPECT_TRUE(found[1].above_all);
+  EXPECT_FALSE(found[2].above_all);
+  EXPECT_FALSE(found[3].above_all);  // within the clearance
+}
+
+TEST(SkyDebris, AVoxelThatIsPartlyBeforeARoofIsNotBeforeTheSky) {
+  // The roof's far edge is at (4, 2): its ray from the camera, (9, 1), is at height 2.5 above x = 8.5.
+  EXPECT_TRUE(stands({{8.5, 2, 2.65}}, 0.3)[0].before_sky);
+  EXPECT_FALSE(stands({{8.5, 2, 2.55}}, 0.3)[0].before_sky);  // its lower corners are behind the roof
+}
+
 TEST(SkyDebris, UpIsWhereItIsSaidToBe) {
   const auto found = sky_stands(roof_over_ground(), std::vector<Vector3d>{{2, 2, 1}, {2, 2, -1}}, {},
-                                {-Vector3d::UnitZ(), 0.5}, 1);
+                                {-Vector3d::UnitZ(), 0.5, 0.2}, 1);
   EXPECT_FALSE(found[0].in_the_open);  // the ground
   EXPECT_TRUE(found[1].in_the_open);
 }
@@ -67,17 +81,19 @@ TEST(SkyDebris, ThreadsDoNotMatter) {
   const auto one = stands(places, 0.5, 1), four = stands(places, 0.5, 4);
   for (std::size_t i = 0; i < places.size(); ++i) {
     EXPECT_EQ(one[i].in_the_open, four[i].in_the_open);
+    EXPECT_EQ(one[i].above_all, four[i].above_all);
     EXPECT_EQ(one[i].before_sky, four[i].before_sky);
   }
 }
 
 TEST(SkyDebris, SharesAreOfVoxelsAndOfOpacity) {
   const std::vector<float> opacity{0.1f, 0.3f, 0.6f, 1.0f};
-  const std::vector<SkyStand> stands{{true, true}, {true, false}, {false, false}, {false, false}};
+  const std::vector<SkyStand> stands{{true, true, true}, {true, false, false}, {}, {}};
   const SkyDebris all = sky_debris(opacity, stands, 0.04), opaque = sky_debris(opacity, stands, 0.3);
   EXPECT_EQ(all.all.voxels, 4);
   EXPECT_DOUBLE_EQ(all.share(all.in_the_open), 0.5);
   EXPECT_DOUBLE_EQ(all.share(all.before_sky), 0.25);
+  EXPECT_DOUBLE_EQ(all.share(all.above_all), 0.25);
   EXPECT_NEAR(all.share_of_opacity(all.in_the_open), 0.2, 1e-6);
   EXPECT_NEAR(all.share_of_opacity(all.before_sky), 0.05, 1e-6);
   EXPECT_EQ(opaque.all.voxels, 3);

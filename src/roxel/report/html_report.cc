@@ -280,10 +280,11 @@ class Page {
   void debris_table(const RunMeasures& m) {
     if (m.debris.empty()) return;
     std::vector<std::vector<std::string>> rows{{"opacity at least", "voxels", "in the open", "of voxels",
-                                                "of opacity", "before the sky", "of voxels", "of opacity"}};
+                                                "of opacity", "above all", "of voxels", "of opacity",
+                                                "before the sky", "of voxels", "of opacity"}};
     for (const SkyDebris& d : m.debris) {
       rows.push_back({short_number(d.opacity_threshold), grouped(d.all.voxels)});
-      for (const VoxelSum& part : {d.in_the_open, d.before_sky}) {
+      for (const VoxelSum& part : {d.in_the_open, d.above_all, d.before_sky}) {
         rows.back().push_back(grouped(part.voxels));
         rows.back().push_back(percent(d.share(part), 3));
         rows.back().push_back(percent(d.share_of_opacity(part), 3));

@@ -131,6 +131,7 @@ ordered_json debris_json(const RunMeasures& measures) {
     list.push_back({{"opacity_threshold", d.opacity_threshold},
                     {"voxels", d.all.voxels},
                     {"in_the_open", part(d.in_the_open)},
+                    {"above_all", part(d.above_all)},
                     {"before_sky", part(d.before_sky)}});
   }
   return list;
@@ -225,11 +226,11 @@ std::string histogram_csv(const DistanceHistogram& histogram) {
 
 std::string debris_csv(const std::vector<SkyDebris>& debris) {
   std::string csv =
-      "opacity_threshold,voxels,in_the_open,in_the_open_share,in_the_open_share_of_opacity,before_sky,"
-      "before_sky_share,before_sky_share_of_opacity\n";
+      "opacity_threshold,voxels,in_the_open,in_the_open_share,in_the_open_share_of_opacity,above_all,"
+      "above_all_share,above_all_share_of_opacity,before_sky,before_sky_share,before_sky_share_of_opacity\n";
   for (const SkyDebris& d : debris) {
     csv += formatted("%g,%lld", d.opacity_threshold, static_cast<long long>(d.all.voxels));
-    for (const VoxelSum& part : {d.in_the_open, d.before_sky})
+    for (const VoxelSum& part : {d.in_the_open, d.above_all, d.before_sky})
       csv += formatted(",%lld,%.6g,%.6g", static_cast<long long>(part.voxels), d.share(part),
                        d.share_of_opacity(part));
     csv += "\n";
@@ -319,11 +320,11 @@ std::string volume_text(const RunMeasures& measures) {
 std::string debris_text(const RunMeasures& measures) {
   if (measures.debris.empty()) return "";
   std::string text =
-      "| sky debris: voxels of opacity | voxels | in the open | % | of opacity % | before the sky | % | of "
-      "opacity % |\n|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+      "| sky debris: voxels of opacity | voxels | in the open | % | of opacity % | above all | % | of opacity % "
+      "| before the sky | % | of opacity % |\n|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const SkyDebris& d : measures.debris) {
     text += formatted("| >= %g | %lld", d.opacity_threshold, static_cast<long long>(d.all.voxels));
-    for (const VoxelSum& part : {d.in_the_open, d.before_sky})
+    for (const VoxelSum& part : {d.in_the_open, d.above_all, d.before_sky})
       text += formatted(" | %lld | %.3f | %.3f", static_cast<long long>(part.voxels), 100 * d.share(part),
                         100 * d.share_of_opacity(part));
     text += " |\n";

@@ -8,6 +8,7 @@
 #include "roxel/base/peak_memory.h"
 #include "roxel/infer/overlap.h"
 #include "roxel/infer/touch.h"
+#include "roxel/solve/carve_sky.h"
 #include "roxel/solve/fit_colors.h"
 #include "roxel/solve/gains.h"
 #include "roxel/solve/surface_paint.h"
@@ -399,7 +400,8 @@ class Levels {
     offer_checkpoint();
   }
 
-  /// What follows a level's passes and needs no checkpoint of its own: light that is chosen or found by the
+  /// What follows a level's passes and needs no checkpoint of its own: skies that are emptied, light that is
+  /// chosen or found by the
   /// first of several levels, and the colours of the last.
   void finish_level(const PassState& state) {
     const auto start = Clock::now();
@@ -407,6 +409,7 @@ class Levels {
     Scene& scene = made_.scene;
     const LevelSamples samples(load_, small_photographs_, options_, context_,
                                std::ldexp(scene.voxel_size, options_.levels - state.level));
+    if (daylight_ && daylight_->has_masks()) empty_the_sky(state.level);
     if (state.level == options_.levels) {
       if (scene.light.by_normal) {
         made_.surface_light = samples.paint_by_normal(scene, *daylight_, made_.volume);
@@ -427,6 +430,14 @@ class Levels {
     record.seconds += seconds_since(start);
     record.peak_memory_bytes = std::max(record.peak_memory_bytes, memory.bytes());
     if (hooks_.after_level) hooks_.after_level(made_.volume, scene, made_.summary);
+  }
+
+  void empty_the_sky(int level) {
+    const std::int64_t emptied =
+        carve_sky(dataset_, load_, daylight_->sky_masked, options_.update, context_, made_.volume);
+    if (level == options_.levels && emptied > 0)
+      made_.summary.notes.push_back(std::to_string(emptied) +
+                                    " voxels that a photograph shows as sky alone were emptied at the end");
   }
 
   void fit_to_photographs() {

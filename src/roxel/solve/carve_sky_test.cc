@@ -1,0 +1,114 @@
+#include "roxel/solve/carve_sky.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace roxel {
+namespace {
+
+constexpr int kSide = 100;  ///< pixels
+
+/// Full lattice of 24^3 voxels of side 0.1 about the origin.
+Volume full_volume() {
+  Topology topology(nested_frames({Eigen::Vector3d(-1.2, -1.2, -1.2), Eigen::Vector3d(1.2, 1.2, 1.2)}, 0.1, 0)[0]);
+  for (int z = 0; z < 24; ++z)
+    for (int y = 0; y < 24; ++y)
+      for (int x = 0; x < 24; ++x) topology.insert({x, y, z});
+  std::vector<Topology> lattices;
+  lattices.push_back(std::move(topology));
+  Volume volume(std::move(lattices));
+  volume.resize_channels();
+  std::fill(volume.tau.begin(), volume.tau.end(), 0.5f);
+  std::fill(volume.support.begin(), volume.support.end(), std::array<float, 2>{3, 6});
+  return volume;
+}
+
+/// Cameras 4 in front of the volume (along z), side by side, 50 degrees wide.
+Dataset two_cameras() {
+  Dataset dataset;
+  for (int v = 0; v < 2; ++v) {
+    View view;
+    view.name = std::to_string(v);
+    view.camera.intrinsics = {kSide, kSide, 100, 100, 50, 50, 0};
+    view.camera.pose.centre = {0.4 * v, 0, -4};
+    dataset.views.push_back(view);
+  }
+  return dataset;
+}
+
+/// Above row `horizon` all is sky, but for one pixel at (70, 10).
+Photograph sky_above(int horizon) {
+  Photograph photo;
+  photo.rgb = Image(kSide, kSide, 3);
+  photo.foreground = Mask(kSide, kSide);
+  for (int y = 0; y < horizon; ++y)
+    for (int x = 0; x < kSide; ++x) photo.foreground.at(x, y) = 3;
+  photo.foreground.at(70, 10) = 200;
+  return photo;
+}
+
+float tau_at(const Volume& volume, const Eigen::Vector3d& at) {
+  const BrickIndex& index = volume.index(0);
+  const LatticeFrame& frame = index.frame();
+  return volume.tau[index.slot(((at - frame.origin) / frame.voxel_size).array().floor().cast<int>().matrix())];
+}
+
+/// The volume after one camera's photograph has carved it.
+Volume carved(int horizon, const std::vector<std::uint8_t>& sky_masked, int threads = 1,
+              UpdateRule rule = UpdateRule::kPosterior) {
+  const Dataset dataset = two_cameras();
+  Volume volume = full_volume();
+  carve_sky(dataset, [&](const View&) { return sky_above(horizon); }, sky_masked, rule, RunContext(threads), volume);
+  return volume;
+}
+
+TEST(CarveSky, EmptiesWhatAPhotographShowsAsSkyAlone) {
+  const Volume volume = carved(50, {1, 0});  // above the optical axis: y < 0
+  EXPECT_EQ(tau_at(volume, {0.05, -0.75, 0.05}), 0);
+  EXPECT_EQ(tau_at(volume, {0.05, -0.75, 1.05}), 0);  // behind it, too
+  EXPECT_EQ(tau_at(volume, {0.05, 0.75, 0.05}), 0.5f);
+  // On the horizon, and where a pixel of the footprint is something else: row 10 is y / z = -0.4, column 70 0.2.
+  EXPECT_EQ(tau_at(volume, {0.05, -0.05, 0.05}), 0.5f);
+  EXPECT_EQ(tau_at(volume, {0.65, -1.15, -1.05}), 0.5f);
+  EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.05}), 0);
+}
+
+TEST(CarveSky, LeavesWhatIsPartlyOutsideTheImage) {
+  const Volume volume = carved(kSide, {1, 0});
+  EXPECT_EQ(tau_at(volume, {0.05, 0.05, -1.15}), 0);
+  EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.15}), 0);     // row 10
+  EXPECT_EQ(tau_at(full_volume(), {0.05, 0.05, 0}), 0.5f);
+  const Dataset dataset = two_cameras();
+  for (const double x : {-1.15, 1.15}) {
+    // Column 50 + 100 x / z: at -1.15 of the second camera that is 50 - 155 / 2.85, outside.
+    const Volume by_second = carved(kSide, {0, 1});
+    EXPECT_EQ(tau_at(by_second, {x, 0.05, -1.15}), x < 0 ? 0.5f : 0.0f);
+  }
+}
+
+TEST(CarveSky, AsksOnlyViewsWhoseMaskIsOfTheSky) {
+  EXPECT_EQ(tau_at(carved(50, {0, 0}), {0.05, -0.75, 0.05}), 0.5f);
+  EXPECT_EQ(tau_at(carved(50, {0, 1}), {0.05, -0.75, 0.05}), 0);
+  EXPECT_EQ(tau_at(carved(50, {}), {0.05, -0.75, 0.05}), 0.5f);
+}
+
+TEST(CarveSky, CountsAndLeavesNoHits) {
+  const Dataset dataset = two_cameras();
+  Volume volume = full_volume();
+  const PhotographLoader load = [](const View&) { return sky_above(50); };
+  const std::int64_t count = carve_sky(dataset, load, {1, 0}, UpdateRule::kPosterior, RunContext(1), volume);
+  EXPECT_EQ(count, std::count(volume.tau.begin(), volume.tau.end(), 0.0f));
+  EXPECT_GT(count, 24 * 24 * 24 / 4);
+  for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot)
+    EXPECT_EQ(volume.support[slot], (volume.tau[slot] > 0 ? std::array<float, 2>{3, 6} : std::array<float, 2>{0, 6}));
+  EXPECT_EQ(carve_sky(dataset, load, {1, 0}, UpdateRule::kPosterior, RunContext(1), volume), 0);
+  const Volume roxels = carved(50, {1, 0}, 1, UpdateRule::kRoxels);
+  for (std::uint32_t slot = 0; slot < roxels.slot_count(); ++slot)
+    if (roxels.tau[slot] == 0) EXPECT_EQ(roxels.support[slot], (std::array<float, 2>{3, 0}));
+}
+
+TEST(CarveSky, ThreadsDoNotMatter) { EXPECT_EQ(carved(50, {1, 1}, 1).tau, carved(50, {1, 1}, 4).tau); }
+
+}  // namespace
+}  // namespace roxel
