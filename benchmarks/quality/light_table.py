@@ -62,7 +62,7 @@ photographs over each light, all at the same {places} places (of {shared} that t
 pixels with known albedo. The last two rows are the floors: true light divided out.
 """
 OWN = """
-Then of the voxels' own colours against albedo, and the error of renders in each image's own light:
+Then every run by itself: the photographs over its own light, at all places that it knows its light at; the voxels' own colours against albedo; and the error of renders in each image's own light.
 """
 DEPTH = """
 ## Geometry
@@ -79,7 +79,7 @@ Voxels of an opacity of 0.04 or 0.3 and more that stand where no true surface is
 COST = """
 ## Cost
 
-On {processors} processors, without `roxel eval`.
+On {processors} processors, at times beside other work; without `roxel eval`.
 """
 
 
@@ -126,7 +126,11 @@ def orders(metrics):
 
 def own_colors(metrics):
     color, images = metrics["color"] or {}, (metrics["images"] or {}).get("object", {})
-    return [number(color.get("mean_delta_e_2000"), 1), number(color.get("median_delta_e_2000"), 1), percent(images.get("rms"), 1)]
+    by = {light["light"]: light for light in metrics["light"]}
+    light = by.get("run", by.get("none", {}))
+    albedo = light.get("albedo") or {}
+    return [str(light.get("places", "-")), number(light.get("mean_spread")), number(albedo.get("mean_log_error")), number(albedo.get("median_log_error")),
+            number(color.get("mean_delta_e_2000"), 1), number(color.get("median_delta_e_2000"), 1), percent(images.get("rms"), 1)]
 
 
 def within(metrics):
@@ -157,7 +161,7 @@ def document(measured, costs, remarks=""):
         places = light[0]
         text += COLORS.format(places=places["places"], shared=places["shared_places"], pixels=(places["albedo"] or {}).get("pixels", 0)) + "\n"
         text += table(["photographs over", "spread, mean", "median", "off albedo, mean", "median"], light_rows(measured[LIT])) + orders(measured[LIT])
-        text += OWN + "\n" + table(["light", "matching", "voxel", "voxels: CIEDE2000, mean", "median", "renders: RMS %"],
+        text += OWN + "\n" + table(["light", "matching", "voxel", "places", "spread, mean", "off albedo, mean", "median", "voxels: CIEDE2000, mean", "median", "renders: RMS %"],
                                    [choice_cells(c) + own_colors(m) for c, m in measured.items()])
     text += DEPTH.format(sure=SURE_M) + "\n"
     text += table(["light", "matching", "voxel", "within 0.5 m", "1 m", "2 m", *(cell for name in SETS for cell in (f"F {name}: 0.5 m", "1 m"))],
