@@ -238,14 +238,16 @@ class SkySun(SkyCase):
             with self.subTest(f"{azimuth}, {elevation}"):
                 a, e = math.radians(azimuth), math.radians(elevation)
                 sun = (math.cos(e) * math.sin(a), math.cos(e) * math.cos(a), math.sin(e))
-                path = panorama(self.folder / "seam.hdr", lambda x, y: clear_sky(x, y, sun))
+                # A disc of one value over several pixels would be taken for one that clips.
+                grain = lambda x, y: 1 + 0.02 * ((3 * x + y) % 8)
+                path = panorama(self.folder / "seam.hdr", lambda x, y: [v * grain(x, y) if v > 100 else v for v in clear_sky(x, y, sun)])
                 _, summary = self.sky("seam", "--no-pictures", "--facets", "4", "--sun", f"{azimuth},{elevation}", data=path)
                 self.assertEqual(summary["skies"][0]["sun_light"], "measured")
                 self.assertEqual(summary["skies"][0]["sun_relative_sigma"], 0.02)
 
     def test_a_sun_that_clips_is_estimated_and_says_how_well(self):
         path = panorama(self.folder / "photo.hdr", lambda x, y: [min(1.0, 2 * v) for v in clear_sky(x, y)])
-        out, summary = self.sky("photo", "--no-pictures", "--facets", "4", data=path)
+        out, summary = self.sky("photo", "--no-pictures", "--facets", "4", "--sun", "140.19,38.64", data=path)
         node = summary["skies"][0]
         self.assertEqual((node["sun_light"], node["sun_relative_sigma"]), ("estimated", 0.47))
         self.assertTrue(any("estimated, within a factor of 1.6" in w for w in summary["warnings"]), summary["warnings"])
