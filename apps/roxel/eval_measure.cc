@@ -366,8 +366,8 @@ class Measurement {
     const std::optional<Eigen::Vector3d> upwards = up();
     if (!upwards || source_.surface->is_point_set()) return;
     session_.context().throw_if_cancelled();
-    const std::vector<SkyStand> stands =
-        sky_stands(*source_.surface, voxels.centres, known_cameras(), {*upwards, out_.voxel_size, out_.voxel_size}, threads_);
+    const std::vector<SkyStand> stands = sky_stands(*source_.surface, voxels.centres, known_cameras(),
+                                                    {*upwards, out_.voxel_size, out_.voxel_size}, threads_);
     out_.debris.push_back(sky_debris(voxels.opacity, stands, options_.opacity_threshold));
     if (options_.opacity_threshold < kOpaqueDebris)
       out_.debris.push_back(sky_debris(voxels.opacity, stands, kOpaqueDebris));

@@ -51,14 +51,13 @@ std::vector<SkyStand> sky_stands(const Mesh& surface, std::span<const Eigen::Vec
   const double limit = std::nextafter(options.clearance, std::numeric_limits<double>::infinity());
   const double top = highest(surface, options.up);
   std::vector<SkyStand> stands(places.size());
-  parallel_for_blocks(
-      static_cast<std::int64_t>(places.size()), kGrain, threads,
-      [&](std::int64_t begin, std::int64_t end, int) {
-        for (std::int64_t i = begin; i < end; ++i)
-          if (std::isinf(distance(places[i], limit)))
-            stands[i] = {!rays.trace(places[i], options.up), options.up.dot(places[i]) > top,
-                         before_sky(rays, places[i], options.voxel_size, cameras)};
-      });
+  parallel_for_blocks(static_cast<std::int64_t>(places.size()), kGrain, threads,
+                      [&](std::int64_t begin, std::int64_t end, int) {
+                        for (std::int64_t i = begin; i < end; ++i)
+                          if (std::isinf(distance(places[i], limit)))
+                            stands[i] = {!rays.trace(places[i], options.up), options.up.dot(places[i]) > top,
+                                         before_sky(rays, places[i], options.voxel_size, cameras)};
+                      });
   return stands;
 }
 

@@ -320,7 +320,8 @@ std::string volume_text(const RunMeasures& measures) {
 std::string debris_text(const RunMeasures& measures) {
   if (measures.debris.empty()) return "";
   std::string text =
-      "| sky debris: voxels of opacity | voxels | in the open | % | of opacity % | above all | % | of opacity % "
+      "| sky debris: voxels of opacity | voxels | in the open | % | of opacity % | above all | % | of "
+      "opacity % "
       "| before the sky | % | of opacity % |\n|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const SkyDebris& d : measures.debris) {
     text += formatted("| >= %g | %lld", d.opacity_threshold, static_cast<long long>(d.all.voxels));

@@ -70,13 +70,15 @@ void mark(const BrickIndex& index, const Brick& brick, const SkyView& view,
   const double size = frame.voxel_size;
   const Eigen::Vector3i first = kBrickSide * brick.coord;
   const Eigen::Vector3d middle =
-      0.5 * (frame.voxel_centre(first) + frame.voxel_centre(first + Eigen::Vector3i::Constant(kBrickSide - 1)));
+      0.5 *
+      (frame.voxel_centre(first) + frame.voxel_centre(first + Eigen::Vector3i::Constant(kBrickSide - 1)));
   if (view.before(middle, kHalfDiagonal * kBrickSide * size) == SkyCount::Share::kNone) return;
   for (int v = 0; v < kBrickVoxels; ++v) {
     if (brick.local[v] == kNoVoxel) continue;
     std::uint8_t& marked = before_sky[brick.first_slot + brick.local[v]];
     const Eigen::Vector3i local(v % kBrickSide, v / kBrickSide % kBrickSide, v / (kBrickSide * kBrickSide));
-    if (!marked && view.before(frame.voxel_centre(first + local), kHalfDiagonal * size) == SkyCount::Share::kAll)
+    if (!marked &&
+        view.before(frame.voxel_centre(first + local), kHalfDiagonal * size) == SkyCount::Share::kAll)
       marked = 1;
   }
 }

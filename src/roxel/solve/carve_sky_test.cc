@@ -11,7 +11,8 @@ constexpr int kSide = 100;  ///< pixels
 
 /// Full lattice of 24^3 voxels of side 0.1 about the origin.
 Volume full_volume() {
-  Topology topology(nested_frames({Eigen::Vector3d(-1.2, -1.2, -1.2), Eigen::Vector3d(1.2, 1.2, 1.2)}, 0.1, 0)[0]);
+  Topology topology(
+      nested_frames({Eigen::Vector3d(-1.2, -1.2, -1.2), Eigen::Vector3d(1.2, 1.2, 1.2)}, 0.1, 0)[0]);
   for (int z = 0; z < 24; ++z)
     for (int y = 0; y < 24; ++y)
       for (int x = 0; x < 24; ++x) topology.insert({x, y, z});
@@ -51,7 +52,8 @@ Photograph sky_above(int horizon) {
 float tau_at(const Volume& volume, const Eigen::Vector3d& at) {
   const BrickIndex& index = volume.index(0);
   const LatticeFrame& frame = index.frame();
-  return volume.tau[index.slot(((at - frame.origin) / frame.voxel_size).array().floor().cast<int>().matrix())];
+  return volume
+      .tau[index.slot(((at - frame.origin) / frame.voxel_size).array().floor().cast<int>().matrix())];
 }
 
 /// The volume after one camera's photograph has carved it.
@@ -59,7 +61,9 @@ Volume carved(int horizon, const std::vector<std::uint8_t>& sky_masked, int thre
               UpdateRule rule = UpdateRule::kPosterior) {
   const Dataset dataset = two_cameras();
   Volume volume = full_volume();
-  carve_sky(dataset, [&](const View&) { return sky_above(horizon); }, sky_masked, rule, RunContext(threads), volume);
+  carve_sky(
+      dataset, [&](const View&) { return sky_above(horizon); }, sky_masked, rule, RunContext(threads),
+      volume);
   return volume;
 }
 
@@ -68,7 +72,8 @@ TEST(CarveSky, EmptiesWhatAPhotographShowsAsSkyAlone) {
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 0.05}), 0);
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 1.05}), 0);  // behind it, too
   EXPECT_EQ(tau_at(volume, {0.05, 0.75, 0.05}), 0.5f);
-  // On the horizon, and where a pixel of the footprint is something else: row 10 is y / z = -0.4, column 70 0.2.
+  // On the horizon, and where a pixel of the footprint is something else: row 10 is y / z = -0.4, column 70
+  // 0.2.
   EXPECT_EQ(tau_at(volume, {0.05, -0.05, 0.05}), 0.5f);
   EXPECT_EQ(tau_at(volume, {0.65, -1.15, -1.05}), 0.5f);
   EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.05}), 0);
@@ -77,7 +82,7 @@ TEST(CarveSky, EmptiesWhatAPhotographShowsAsSkyAlone) {
 TEST(CarveSky, LeavesWhatIsPartlyOutsideTheImage) {
   const Volume volume = carved(kSide, {1, 0});
   EXPECT_EQ(tau_at(volume, {0.05, 0.05, -1.15}), 0);
-  EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.15}), 0);     // row 10
+  EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.15}), 0);  // row 10
   EXPECT_EQ(tau_at(full_volume(), {0.05, 0.05, 0}), 0.5f);
   const Dataset dataset = two_cameras();
   for (const double x : {-1.15, 1.15}) {
@@ -101,7 +106,8 @@ TEST(CarveSky, CountsAndLeavesNoHits) {
   EXPECT_EQ(count, std::count(volume.tau.begin(), volume.tau.end(), 0.0f));
   EXPECT_GT(count, 24 * 24 * 24 / 4);
   for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot)
-    EXPECT_EQ(volume.support[slot], (volume.tau[slot] > 0 ? std::array<float, 2>{3, 6} : std::array<float, 2>{0, 6}));
+    EXPECT_EQ(volume.support[slot],
+              (volume.tau[slot] > 0 ? std::array<float, 2>{3, 6} : std::array<float, 2>{0, 6}));
   EXPECT_EQ(carve_sky(dataset, load, {1, 0}, UpdateRule::kPosterior, RunContext(1), volume), 0);
   const Volume roxels = carved(50, {1, 0}, 1, UpdateRule::kRoxels);
   for (std::uint32_t slot = 0; slot < roxels.slot_count(); ++slot)
