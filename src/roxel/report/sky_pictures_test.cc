@@ -7,7 +7,7 @@
 namespace roxel {
 namespace {
 
-const Image& named(const std::vector<SkyPanel>& panels, const std::string& name) {
+Image named(const std::vector<SkyPanel>& panels, const std::string& name) {
   return std::find_if(panels.begin(), panels.end(), [&](const SkyPanel& p) { return p.name == name; })
       ->picture;
 }
@@ -22,7 +22,7 @@ TEST(SkyPanels, ErrorsAreShownOfAllThatIsSeenAboveTheHorizon) {
   Square square;
   square.roof_deg = 25;
   const SkyFit fit = fit_one(panorama_of(clear_sky(), square));
-  const Image& error = named(sky_panels(fit), "error");
+  const Image error = named(sky_panels(fit), "error");
   const Eigen::Vector3d sky = sun_direction({330, 50}), wall = sun_direction({330, 12}),
                         ground = sun_direction({330, -10});
   ASSERT_TRUE(fit.used[fit.light.sphere->facet_at(sky)]);

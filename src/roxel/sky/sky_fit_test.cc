@@ -334,13 +334,13 @@ TEST(FitSky, SunlightThatNoImageShowsIsEstimatedUnderClearSkiesAlone) {
 }
 
 TEST(FitSky, WhatCanBeDecidedGrowsWithTheFacets) {
-  // A net over the sky but for a hole of 18 degrees: its meshes wait for the fit, and then are most of it.
+  // A net over the sky but for a hole of 20 degrees: its meshes wait for the fit, and then are most of it.
   SkyPicture picture = panorama_of(clear_sky(), {});
   const Eigen::Vector3d hole = sun_direction({330, 50});
   for (int y = 0; y < 75; ++y)
     for (int x = 0; x < 360; ++x)
-      if ((x % 8 == 0 || y % 8 == 0) &&
-          picture.rays.direction(x + 0.5, y + 0.5).dot(hole) < std::cos(9 * kDegree))
+      if ((x % 6 == 0 || y % 6 == 0) &&
+          picture.rays.direction(x + 0.5, y + 0.5).dot(hole) < std::cos(10 * kDegree))
         for (int c = 0; c < 3; ++c) picture.rgb.pixel(x, y)[c] *= 0.3f;
   SkyTask task;
   task.views = {"a"};
