@@ -100,7 +100,7 @@ ReportMesh mesh_pictures_of(const fs::path& run) {
 void add_skies(const fs::path& results, ReportContent& content) {
   const auto options = content.summary.value("options", nlohmann::ordered_json::object());
   if (const auto from = options.find("sky"); from != options.end() && from->is_string()) {
-    content.skies_from = from->get<std::string>();
+    content.skies_from = fs::absolute(from->get<std::string>()).lexically_normal().string();
     if (fs::is_regular_file(fs::path(content.skies_from) / "summary.json"))
       content.their_skies = nlohmann::ordered_json(read_summary(content.skies_from))
                                 .value("skies", nlohmann::ordered_json::array());
