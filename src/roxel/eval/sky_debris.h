@@ -15,7 +15,7 @@ struct SkyStand {
   bool in_the_open = false;  ///< a ray from its centre straight up meets no true surface
   bool above_all = false;    ///< it is higher than all of the true surface
   bool before_sky = false;   ///< some view shows nothing but sky there: its rays through centre and corners
-                            ///< meet no true surface, before the voxel or behind
+                             ///< meet no true surface, before the voxel or behind
 };
 
 struct SkyDebrisOptions {

@@ -52,9 +52,9 @@ TEST(SkyDebris, AboveAllIsHigherThanTheHighestRoof) {
 }
 
 TEST(SkyDebris, AVoxelThatIsPartlyBeforeARoofIsNotBeforeTheSky) {
-  // The roof's far edge is at (4, 2): its ray from the camera, (9, 1), is at height 2.5 above x = 8.5.
-  EXPECT_TRUE(stands({{8.5, 2, 2.65}}, 0.3)[0].before_sky);
-  EXPECT_FALSE(stands({{8.5, 2, 2.55}}, 0.3)[0].before_sky);  // its lower corners are behind the roof
+  // Seen from below, the roof's far edge (4, 2) is at height 2.5 above x = 8.5; the roof is above that ray.
+  EXPECT_TRUE(stands({{8.5, 2, 2.35}}, 0.3)[0].before_sky);
+  EXPECT_FALSE(stands({{8.5, 2, 2.45}}, 0.3)[0].before_sky);  // its upper corners are behind the roof
 }
 
 TEST(SkyDebris, UpIsWhereItIsSaidToBe) {

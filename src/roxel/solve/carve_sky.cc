@@ -1,5 +1,6 @@
 #include "roxel/solve/carve_sky.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -9,8 +10,7 @@ namespace roxel {
 namespace {
 
 constexpr std::uint8_t kSurelySky = 5;  ///< of 255: the most that is still foreground
-constexpr double kMarginPixels = 1;
-constexpr double kHalfDiagonal = 0.8660254037844386;  ///< of a cube of side 1
+constexpr double kMarginPixels = 0.5;
 
 /// How many pixels of any rectangle are surely sky: sums over all pixels above and to the left.
 class SkyCount {
@@ -25,10 +25,12 @@ class SkyCount {
   }
 
   enum class Share { kNone, kSome, kAll };
-  /// Of the pixels that the disc's bounding square touches; kSome where part of it is outside the image.
-  Share within(double u, double v, double radius) const {
-    const double left = std::floor(u - radius), top = std::floor(v - radius);
-    const double right = std::floor(u + radius) + 1, bottom = std::floor(v + radius) + 1;
+  /// Of the pixels that the rectangle, and the margin around it, touches; kSome where part is outside the
+  /// image.
+  Share within(const Eigen::AlignedBox2d& pixels) const {
+    const Eigen::Vector2d first = (pixels.min().array() - kMarginPixels).floor();
+    const Eigen::Vector2d last = (pixels.max().array() + kMarginPixels).floor() + 1;
+    const double left = first.x(), top = first.y(), right = last.x(), bottom = last.y();
     const auto x0 = static_cast<std::int64_t>(std::clamp(left, 0.0, static_cast<double>(width_)));
     const auto y0 = static_cast<std::int64_t>(std::clamp(top, 0.0, static_cast<double>(height_)));
     const auto x1 = static_cast<std::int64_t>(std::clamp(right, 0.0, static_cast<double>(width_)));
@@ -47,19 +49,24 @@ class SkyCount {
   std::vector<std::int32_t> sums_;
 };
 
-/// One photograph's view of spheres.
+/// One photograph's view of cubes along the axes.
 struct SkyView {
   PinholeCamera camera;
   SkyCount sky;
 
-  SkyCount::Share before(const Eigen::Vector3d& centre, double radius) const {
-    const Eigen::Vector3d seen = camera.project(centre);
-    if (!(seen.z() > radius)) return seen.z() > -radius ? SkyCount::Share::kSome : SkyCount::Share::kNone;
-    const Intrinsics& k = camera.intrinsics;
-    // A sphere beside the axis is an ellipse, longer than wide: by the slope of the ray at most.
-    const double x = (seen.x() - k.cx) / k.fx, y = (seen.y() - k.cy) / k.fy;
-    const double pixels = std::max(k.fx, k.fy) * radius * (1 + x * x + y * y) / (seen.z() - radius);
-    return sky.within(seen.x(), seen.y(), pixels + kMarginPixels);
+  SkyCount::Share before(const Eigen::Vector3d& centre, double side) const {
+    Eigen::AlignedBox2d pixels;
+    int behind = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3d off(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5);
+      const Eigen::Vector3d seen = camera.project(centre + side * off);
+      if (seen.z() > 0)
+        pixels.extend(Eigen::Vector2d(seen.head<2>()));
+      else
+        ++behind;
+    }
+    if (behind > 0) return behind == 8 ? SkyCount::Share::kNone : SkyCount::Share::kSome;
+    return sky.within(pixels);
   }
 };
 
@@ -72,7 +79,7 @@ void mark(const BrickIndex& index, const Brick& brick, const SkyView& view,
   const Eigen::Vector3d middle =
       0.5 *
       (frame.voxel_centre(first) + frame.voxel_centre(first + Eigen::Vector3i::Constant(kBrickSide - 1)));
-  if (view.before(middle, kHalfDiagonal * kBrickSide * size) == SkyCount::Share::kNone) return;
+  if (view.before(middle, kBrickSide * size) == SkyCount::Share::kNone) return;
   for (int v = 0; v < kBrickVoxels; ++v) {
     if (brick.local[v] == kNoVoxel) continue;
     std::uint8_t& marked = before_sky[brick.first_slot + brick.local[v]];
