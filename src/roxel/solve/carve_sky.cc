@@ -84,9 +84,7 @@ void mark(const BrickIndex& index, const Brick& brick, const SkyView& view,
     if (brick.local[v] == kNoVoxel) continue;
     std::uint8_t& marked = before_sky[brick.first_slot + brick.local[v]];
     const Eigen::Vector3i local(v % kBrickSide, v / kBrickSide % kBrickSide, v / (kBrickSide * kBrickSide));
-    if (!marked &&
-        view.before(frame.voxel_centre(first + local), kHalfDiagonal * size) == SkyCount::Share::kAll)
-      marked = 1;
+    if (!marked && view.before(frame.voxel_centre(first + local), size) == SkyCount::Share::kAll) marked = 1;
   }
 }
 
