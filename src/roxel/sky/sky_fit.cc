@@ -413,8 +413,8 @@ class Fitting {
     sky().clearness_bin = known_sun() ? fit_perez(samples(), 1, sky().sun, fit).start : 0;
   }
 
-  /// Around a direction, from `inner` to `outer` degrees: the share that fit or masks took for sky, the share
-  /// of the fit alone, and the mean luminance of what is seen.
+  /// Around a direction, from `inner` to `outer` degrees: the share that fit or masks took for sky, that of
+  /// the fit and of sky that clips, and the mean luminance of what is seen.
   struct Ring {
     double sky_share = 0, used_share = 0, luminance = 0;
   };
@@ -425,7 +425,7 @@ class Fitting {
       const double apart = angle_deg(sphere_->centre(f), direction), area = sphere_->solid_angle(f);
       if (apart < inner || apart > outer) continue;
       around += area;
-      if (out_.used[f]) ring.used_share += area;
+      if (out_.used[f] || out_.clipped_sky[f]) ring.used_share += area;
       if (out_.used[f] || out_.masks.sky[f]) ring.sky_share += area;
       if (out_.light.facets[f].weight > 0)
         seen += area, ring.luminance += area * luminance(out_.light.facets[f].mean);
@@ -454,6 +454,7 @@ class Fitting {
     for (const SunMeasure& m : measures_) {
       clipped_ |= m.clipped;
       dark_ |= !m.shines;
+      shines_ |= m.shines;
       if (m.shines && !m.clipped) measured.push_back(m.irradiance);
     }
     if (!measured.empty()) return use_measured(measured);
@@ -541,6 +542,7 @@ class Fitting {
     if (!found_ || sky().sun_source == SunSource::kImages) return false;
     const double apart = angle_deg(sky().sun, found_->direction);
     if (apart < kSunsDifferDeg || !surely_) return false;
+    if (shines_ && sky_around_sun()) return false;  // it is where it should be: the other is a reflection
     out_.warnings.push_back(
         formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
                   "reflection, or a wrong time, place or north",
@@ -554,9 +556,10 @@ class Fitting {
   std::shared_ptr<const FacetSphere> sphere_;
   std::vector<SunMeasure> measures_;
   std::optional<FoundSun> found_;
-  bool surely_ = false;                  ///< found_ is a sun
-  bool dark_ = false, clipped_ = false;  ///< in an image, the place of the sun; its disc
-  bool fitted_before_ = false;           ///< channels hold a fit of this model
+  bool surely_ = false;                 ///< found_ is a sun
+  bool dark_ = false, shines_ = false;  ///< in an image, where the sun should be
+  bool clipped_ = false;                ///< its disc, in an image
+  bool fitted_before_ = false;          ///< channels hold a fit of this model
   SkyFit out_;
 };
 

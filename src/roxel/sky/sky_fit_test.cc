@@ -300,6 +300,18 @@ TEST(FitSky, WarnsOfAWrongTimeInPhotographsToo) {
             "apart"));
 }
 
+TEST(FitSky, AReflectionIsNoSecondSunWhereTheFirstIsSeen) {
+  SkyPicture picture = panorama_of(clear_sky(181.19, 59.73), {});
+  for (int y = 80; y < 83; ++y)
+    for (int x = 20; x < 23; ++x)
+      std::fill_n(picture.rgb.pixel(x, y), 3, 2000.0f + static_cast<float>(x * y));
+  EXPECT_FALSE(warns(fit_one(picture, {}, noon()), "apart"));
+  for (int y = 0; y < 60; ++y)  // a wall where the sun should be
+    for (int x = 330; x < 390; ++x)
+      std::fill_n(picture.rgb.pixel(x % 360, y), 3, 0.3f * (1 + 0.5f * unrest(x, y)));
+  EXPECT_TRUE(warns(fit_one(picture, {}, noon()), "apart"));
+}
+
 TEST(FitSky, WarnsOfAClearSkyWithoutTheSunWhereItShouldBe) {
   Square square;
   square.disc = false;
