@@ -5,7 +5,8 @@
 
 A module may include itself and any module of a lower row, not another one of its own row. Tests
 (*_test.cc, *_test.h) may look up. OpenVDB and Ceres stay out of headers: they cost minutes of compile
-time, and whoever uses roxel should not need them.
+time, and whoever uses roxel should not need them. No two headers define a type of the same name: both are in
+namespace roxel, and the linker takes either one's functions for both.
 """
 
 import pathlib
@@ -27,6 +28,7 @@ LADDER = [
 ]
 ROW = {module: row for row, modules in enumerate(LADDER) for module in modules}
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
+TYPE = re.compile(r"^(?:struct|class)\s+(?:alignas\([^)]*\)\s*)?(\w+)\b(?!\s*<)[^;{]*\{", re.MULTILINE)
 SOURCES = {".h", ".cc", ".cpp", ".inl"}
 NOT_IN_HEADERS = {"openvdb": "OpenVDB", "nanovdb": "NanoVDB", "ceres": "Ceres"}
 
@@ -60,8 +62,8 @@ def problem_with(path, module, included):
 
 
 def violations(root):
-    """Yields "file:line: why" for every include that breaks the rules, and how many files were read."""
-    found, count = [], 0
+    """Yields "file:line: why" for every include and name that breaks the rules, and how many files were read."""
+    found, count, headers = [], 0, {}
     for folder in ("src", "apps", "python"):
         for file in sorted((root / folder).rglob("*")):
             path = file.relative_to(root)
@@ -72,7 +74,13 @@ def violations(root):
             if module not in ROW:
                 found.append(f'{path}:1: module "{module}" is not on the ladder')
                 continue
-            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+            text = file.read_text(encoding="utf-8")
+            for match in TYPE.finditer(text) if file.suffix == ".h" and module != "apps" else ():
+                line = text.count("\n", 0, match.start()) + 1
+                other = headers.setdefault(match[1], f"{path}:{line}")
+                if other != f"{path}:{line}":
+                    found.append(f"{path}:{line}: {match[1]} is defined in {other}, too")
+            for number, line in enumerate(text.splitlines(), 1):
                 match = INCLUDE.match(line)
                 problem = match and problem_with(path, module, match[1])
                 if problem:

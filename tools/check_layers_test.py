@@ -40,6 +40,16 @@ class CheckLayers(unittest.TestCase):
         self.assertEqual(found, [])
         self.assertEqual(count, len(ALLOWED))
 
+    def test_a_type_that_two_headers_define_is_found(self):
+        light = "struct Light {\n  int a;\n};\n"
+        found, _ = self.check({"src/roxel/solve/light.h": light, "src/roxel/synth/lights.h": "\n" + light})
+        self.assertEqual(found, ["src/roxel/synth/lights.h:2: Light is defined in src/roxel/solve/light.h:1, too"])
+
+    def test_declarations_specialisations_and_sources_may_repeat_names(self):
+        self.assertEqual(self.check({"src/roxel/solve/a.h": "struct A {\n};\nclass B;\ntemplate <>\nstruct T<int> {\n};\n",
+                                     "src/roxel/synth/b.h": "struct A;\nclass B {\n};\ntemplate <>\nstruct T<float> {\n};\n",
+                                     "src/roxel/synth/c.cc": "namespace {\nstruct A {\n};\n}\n"})[0], [])
+
     def test_each_forbidden_include_is_found_at_its_line(self):
         for (name, line), reason in FORBIDDEN.items():
             with self.subTest(name=name, line=line):

@@ -4,8 +4,8 @@
     gain_table.py [--roxel PROGRAM] [--data DIR] [--work DIR] [--docs DIR] [--voxel-size S] [--folds N]
 
 Reconstructs the data set `statue-of-liberty` (90 photographs from the internet, from clear noon to sunset) N times (8), each time without every
-Nth photograph, once with `--illumination none` and once with `gain`, and measures the photographs left out. Runs that are there are measured again, not
-made again. Skips, and says so, where the data are not there. No picture of the data is written.
+Nth photograph, once with `--illumination none` and once with `gain`, and measures the photographs left out. What the same program has made by the
+same command is not made again. Skips, and says so, where the data are not there. No picture of the data is written.
 """
 
 import argparse
@@ -15,7 +15,8 @@ import os
 import pathlib
 import sys
 
-from sky_table import data_root, roxel, table
+from runs import make
+from sky_table import data_root, table
 
 BOX = "--bounds=0.2,-1.15,-0.45,1.05,1.35,1.7"  # statue and pedestal; the longest side is 2.5
 LIGHTS = ("none", "gain")
@@ -30,7 +31,7 @@ photograph's own gains where the run fitted gains. `roxel reconstruct DATA {box}
 NOTE = """
 *All*: over the pixels of all {images} photographs, each measured by the run that lacks it. Our target was a ratio of 0.80.
 
-What is left with gains is not theirs: {uncovered}the sun stands elsewhere in every photograph, and one factor an image cannot move shading and shadow;
+What is left with gains is not theirs: the sun stands elsewhere in every photograph, and one factor an image cannot move shading and shadow;
 cameras are off by a pixel or two, so outlines and folds do not meet.
 """
 
@@ -48,9 +49,11 @@ def fold_data(data, folder, fold, folds):
 
 def measured(program, data, run, light, size):
     """Square error and pixels of the photographs left out, over the object."""
-    if not (run / "summary.json").exists():
-        roxel(program, "reconstruct", data, "-o", run, BOX, "--voxel-size", size, "--illumination", light, "--no-mesh", "--no-depth", "--no-report")
-    held_out = roxel(program, "eval", run, "--truth", data)["held_out"]["object"]
+    make([program, "reconstruct", str(data), "-o", str(run), BOX, "--voxel-size", f"{size:g}", "--illumination", light, "--no-mesh", "--no-depth",
+          "--no-report", "--quiet"], run, "summary.json")
+    metrics = run.with_name(run.name + "-metrics")
+    make([program, "eval", str(run), "--truth", str(data), "-o", str(metrics), "--quiet"], metrics, "metrics.json", [run])
+    held_out = json.loads((metrics / "metrics.json").read_text())["held_out"]["object"]
     return held_out["rms"] ** 2 * held_out["pixels"], held_out["pixels"]
 
 
@@ -64,7 +67,7 @@ def main():
     here = pathlib.Path(__file__).resolve().parents[2]
     parser.add_argument("--roxel", default=here / "build/release/apps/roxel/roxel")
     parser.add_argument("--data")
-    parser.add_argument("--work", type=pathlib.Path, default=pathlib.Path("gain-table"))
+    parser.add_argument("--work", type=pathlib.Path, default=here / "build/gain-table")
     parser.add_argument("--docs", type=pathlib.Path, default=here / "docs/results")
     parser.add_argument("--voxel-size", type=float, default=0.012)
     parser.add_argument("--folds", type=int, default=8)
@@ -78,7 +81,7 @@ def main():
     for fold in range(arguments.folds):
         folder = arguments.work / f"{fold}-of-{arguments.folds}"
         fold_data(data, folder / "data", fold, arguments.folds)
-        squares = {light: measured(arguments.roxel, folder / "data", folder / light, light, arguments.voxel_size) for light in LIGHTS}
+        squares = {light: measured(str(arguments.roxel), folder / "data", folder / light, light, arguments.voxel_size) for light in LIGHTS}
         for light in LIGHTS:
             for i in range(2): all_squares[light][i] += squares[light][i]
         count = len(json.loads((folder / "data/transforms_test.json").read_text())["frames"])
@@ -89,7 +92,7 @@ def main():
     print(rows[-1])
     text = HEAD.format(folds=arguments.folds, box=BOX, size=arguments.voxel_size) + "\n"
     text += table(["left out", "photographs", "none, RMS %", "gain, RMS %", "gain / none"], rows)
-    (arguments.docs / "gain.md").write_text(text + NOTE.format(images=images, uncovered=""))
+    (arguments.docs / "gain.md").write_text(text + NOTE.format(images=images))
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ Points candidate_axes(const std::array<Vector3d, 4>& corners, const Vector3d& fo
 
 }  // namespace
 
-std::array<Vector3d, 8> frustum_corners(const PinholeCamera& camera, const DepthRange& range) {
+std::array<Vector3d, 8> frustum_corners(const PinholeCamera& camera, const FrustumRange& range) {
   ROXEL_CHECK(std::isfinite(range.far));
   const auto directions = corner_directions(camera);
   std::array<Vector3d, 8> corners;
@@ -68,13 +68,13 @@ std::array<Vector3d, 8> frustum_corners(const PinholeCamera& camera, const Depth
   return corners;
 }
 
-bool sees(const PinholeCamera& camera, const Vector3d& x_in_world, const DepthRange& range) {
+bool sees(const PinholeCamera& camera, const Vector3d& x_in_world, const FrustumRange& range) {
   const Vector3d p = camera.project(x_in_world);
   if (!(p.z() > 0) || p.z() < range.near || p.z() > range.far) return false;
   return p.x() >= 0 && p.x() <= camera.intrinsics.width && p.y() >= 0 && p.y() <= camera.intrinsics.height;
 }
 
-bool sees_box(const PinholeCamera& camera, const Eigen::AlignedBox3d& box, const DepthRange& range) {
+bool sees_box(const PinholeCamera& camera, const Eigen::AlignedBox3d& box, const FrustumRange& range) {
   if (box.isEmpty()) return false;
   // Work about the optical centre, and let the frustum end where the box does.
   Points corners = box_corners(box);

@@ -58,7 +58,7 @@ TEST(Frustum, DoesNotSeeBoxesBesideBehindOrPastTheRange) {
 }
 
 /// How many points of a lattice in the box are seen.
-int count_seen(const PinholeCamera& camera, const AlignedBox3d& box, const DepthRange& range, int steps) {
+int count_seen(const PinholeCamera& camera, const AlignedBox3d& box, const FrustumRange& range, int steps) {
   int seen = 0;
   for (int i = 0; i <= steps; ++i)
     for (int j = 0; j <= steps; ++j)
@@ -72,7 +72,7 @@ TEST(Frustum, EdgeBesideEdgeIsSeparatedByNoFace) {
   // either has the other wholly on its outer side.
   PinholeCamera camera = square_camera();
   camera.pose.rotation = Eigen::AngleAxisd(2, Vector3d::UnitX()).toRotationMatrix();
-  const DepthRange range{0.5, 6};
+  const FrustumRange range{0.5, 6};
   AlignedBox3d box(Vector3d(2.75, -1.75, -5.25), Vector3d(4.25, 0.75, -0.75));
   EXPECT_FALSE(sees_box(camera, box, range));
   EXPECT_EQ(count_seen(camera, box, range, 40), 0);
@@ -94,7 +94,7 @@ RC_GTEST_PROP(Frustum, AgreesWithSamplingTheBox,
   const Vector3d middle = camera.world_from_camera({4 * unit(e) - 2, 4 * unit(a ^ b) - 2, 4 * unit(c ^ d)});
   const Vector3d half(0.05 + unit(d) / 2, 0.05 + unit(e) / 2, 0.05 + unit(b) / 2);
   const AlignedBox3d box(middle - half, middle + half);
-  const DepthRange range{0.2, 3};
+  const FrustumRange range{0.2, 3};
   const int seen = count_seen(camera, box, range, 12);
   RC_CLASSIFY(seen > 0);
   RC_CLASSIFY(sees_box(camera, box, range));

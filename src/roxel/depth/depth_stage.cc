@@ -300,7 +300,7 @@ class DepthStage {
     std::vector<const MatchView*> pointers;
     for (const auto& view : held) pointers.push_back(view.get());
     const PlaneMap start = first_planes(v, own->depth, own->variance, context_.thread_count());
-    RefineOptions options;
+    PatchMatchOptions options;
     options.patch.radius = options_.refine_radius;
     options.patch.noise = options_.refine_noise;
     options.patch.gap = scene_.voxel_size;

@@ -67,7 +67,7 @@ struct Hypothesis {
 class ViewRefinement {
  public:
   ViewRefinement(const MatchView& view, std::span<const MatchView* const> sources, const PlaneMap& start,
-                 const RefineOptions& options, const RunContext& context)
+                 const PatchMatchOptions& options, const RunContext& context)
       : view_(view),
         start_(start),
         options_(options),
@@ -398,7 +398,7 @@ class ViewRefinement {
 
   const MatchView& view_;
   const PlaneMap& start_;
-  const RefineOptions& options_;
+  const PatchMatchOptions& options_;
   const RunContext& context_;
   int width_, height_;
   float focal_;
@@ -411,7 +411,7 @@ class ViewRefinement {
 }  // namespace
 
 RefinedView refine_view(const MatchView& view, std::span<const MatchView* const> sources,
-                        const PlaneMap& start, const RefineOptions& options, const RunContext& context) {
+                        const PlaneMap& start, const PatchMatchOptions& options, const RunContext& context) {
   return ViewRefinement(view, sources, start, options, context).run();
 }
 

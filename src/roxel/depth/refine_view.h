@@ -19,7 +19,7 @@ struct MatchView {
   Image variance;  ///< of it
 };
 
-struct RefineOptions {
+struct PatchMatchOptions {
   PatchOptions patch;
   int sources = 8;             ///< views that a patch is looked for in, at most 32
   int iterations = 3;          ///< rounds of propagation over the view
@@ -40,6 +40,6 @@ struct RefinedView {
 /// `sources` show what the view shows; where they do is known from their depth. `start`: a plane for each
 /// pixel that has depth. Rows are shared among the context's threads; results do not depend on how many.
 RefinedView refine_view(const MatchView& view, std::span<const MatchView* const> sources,
-                        const PlaneMap& start, const RefineOptions& options, const RunContext& context);
+                        const PlaneMap& start, const PatchMatchOptions& options, const RunContext& context);
 
 }  // namespace roxel

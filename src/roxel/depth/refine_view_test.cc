@@ -48,7 +48,7 @@ class RefineView : public ::testing::Test {
   MatchView view_;
   std::vector<MatchView> sources_;
   PlaneMap start_;
-  RefineOptions options_;
+  PatchMatchOptions options_;
 };
 
 TEST_F(RefineView, FindsThePlaneThatThePhotographsShow) {
@@ -76,7 +76,7 @@ TEST_F(RefineView, FindsThePlaneThoughTheVolumeIsSureOfAFalseOneInFront) {
   options_.sigmas = 4;
   const RefinedView held = refine();
   EXPECT_GT(errors_of(held.planes, held.variance, view_.camera, 8).median, 0.15);
-  options_.sigmas = RefineOptions().sigmas;
+  options_.sigmas = PatchMatchOptions().sigmas;
   const RefinedView refined = refine();
   const Errors after = errors_of(refined.planes, refined.variance, view_.camera, 8);
   EXPECT_LT(after.median, 0.01);

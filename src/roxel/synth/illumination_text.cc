@@ -24,7 +24,7 @@ Eigen::Vector3d node_centre(const World& world, int occasion) {
 }
 
 /// The light of an occasion.
-ordered_json light_json(const World& world, const Light& light, int occasion) {
+ordered_json light_json(const World& world, const WorldLight& light, int occasion) {
   const Sun& sun = light.environment.sun();
   const Eigen::Vector3d d = sun.direction.cast<double>();
   const double azimuth = std::atan2(d.x(), d.y()) * kDegrees;

@@ -76,11 +76,11 @@ float exposure_for(const Environment& environment) {
   return 0.8f * kPiFloat / environment.total_irradiance().mean();
 }
 
-Light outdoor_light(int index, UtcSeconds time, const Weather& weather) {
+WorldLight outdoor_light(int index, UtcSeconds time, const Weather& weather) {
   const SunPosition sun = sun_position(time, kWorldLatitudeDeg, kWorldLongitudeDeg);
   char name[16];
   std::snprintf(name, sizeof name, "n%02d", index);
-  Light light{name, daylight(sun_direction(sun).cast<float>(), weather)};
+  WorldLight light{name, daylight(sun_direction(sun).cast<float>(), weather)};
   light.exposure = exposure_for(light.environment);
   light.sky = to_string(weather.kind);
   light.time_utc_s = time;
@@ -143,12 +143,12 @@ Lights make_lights(const World& world, const LightPlan& plan, const RunContext& 
     lights.all.push_back({"n00", studio(world.lamp_direction, world.surround)});
     return lights;
   }
-  std::vector<std::unique_ptr<Light>> made(one ? 1 : occasions);
+  std::vector<std::unique_ptr<WorldLight>> made(one ? 1 : occasions);
   parallel_for(static_cast<std::int64_t>(made.size()), context.thread_count(), [&](std::int64_t index, int) {
     context.throw_if_cancelled();
     const int i = static_cast<int>(index);
     const UtcSeconds time = world.times_utc_s[plan.moving_shadows ? i : 0];
-    made[i] = std::make_unique<Light>(outdoor_light(i, time, weather_of(i, plan)));
+    made[i] = std::make_unique<WorldLight>(outdoor_light(i, time, weather_of(i, plan)));
   });
   for (auto& light : made) lights.all.push_back(std::move(*light));
   return lights;

@@ -30,7 +30,7 @@ Environment daylight(const Eigen::Vector3f& to_sun, const Weather& weather);
 /// about 1.
 Environment studio(const Eigen::Vector3f& to_lamp, float surround = 1);
 
-struct Light {
+struct WorldLight {
   std::string name;  ///< of its files: "n00", "n01", ...
   Environment environment;
   float exposure = 1;  ///< photographs with 8 bits are radiance times this
@@ -46,7 +46,7 @@ struct LightPlan {
 
 /// Different lights, and which one each occasion has.
 struct Lights {
-  std::vector<Light> all;
+  std::vector<WorldLight> all;
   std::vector<int> of_occasion;
 };
 

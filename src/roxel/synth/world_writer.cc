@@ -53,7 +53,7 @@ struct Stage {
   std::vector<TriangleMesh> passing;  ///< at each occasion; empty without transients
   PathOptions path;
 
-  const Light& light(int occasion) const { return lights.all[lights.of_occasion[occasion]]; }
+  const WorldLight& light(int occasion) const { return lights.all[lights.of_occasion[occasion]]; }
 };
 
 Stage set_stage(WorldKind kind, const WorldRequest& request, const SynthOptions& options, LightKind light,
@@ -99,7 +99,7 @@ void write_pixels(const fs::path& folder, const std::string& name, const Picture
 }
 
 void write_lights(const fs::path& folder, const Lights& lights, const WorldWriters& writers) {
-  for (const Light& light : lights.all) {
+  for (const WorldLight& light : lights.all) {
     writers.half_exr(folder / "sky" / (light.name + ".exr"), light.environment.map_with_disc());
     writers.half_exr(folder / "sky" / (light.name + "_nosun.exr"), light.environment.map_without_disc());
   }
@@ -108,7 +108,7 @@ void write_lights(const fs::path& folder, const Lights& lights, const WorldWrite
 /// As the sensor has it: exposed, and with its noise.
 Picture photograph(const Stage& stage, int shot_idx, const SynthOptions& options, const RunContext& context) {
   const Shot& shot = stage.world.shots[shot_idx];
-  const Light& light = stage.light(shot.occasion);
+  const WorldLight& light = stage.light(shot.occasion);
   // Trees of rays with passing things are made when they are wanted: a hundred occasions would fill memory.
   const auto everything = stage.passing.empty()
                               ? nullptr
@@ -155,7 +155,7 @@ SyntheticCameras describe(const Stage& stage, const std::vector<PinholeCamera>& 
   set.with_transients = !stage.passing.empty();
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Shot& shot = world.shots[i];
-    const Light& light = stage.light(shot.occasion);
+    const WorldLight& light = stage.light(shot.occasion);
     SyntheticFrame frame{shot.name, cameras[i], {}, {}, light.name};
     if (world.occasions_are_nodes) frame.node = shot.occasion;
     if (light.time_utc_s) {
