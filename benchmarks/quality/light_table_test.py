@@ -42,7 +42,7 @@ class Page(unittest.TestCase):
         measured = {Choice("none", "canonical"): metrics(), light_table.LIT: lit}
         page = light_table.document(measured, {c: (70.4, 2**30, 800000) for c in measured}, "## By hand\n\nWhy.")
         self.assertIn("| none | canonical | 0.5 | 40.0 | 50.0 | 70.0 | 0.500 | 0.600 | 0.700 | 0.800 | - | - | 0.600 | 0.700 |", page)
-        self.assertIn("| none | canonical | 0.5 | 4000 | 2.00 | 1.00 | 0.10 | 0.05 | 4000 |", page)
+        self.assertIn("| none | canonical | 0.5 | 4000 | 2.00 | 1.00 | 0.01 | 0.01 | 0.10 | 0.05 | 4000 |", page)
         self.assertIn("all at the same 900 places (of 1000", page)
         self.assertIn("| sky-normal | 0.500 | 0.500 | 0.500 | 0.400 |", page)
         self.assertIn("| none | canonical | 0.5 | 0.8 | 70 | 1.0 |", page)

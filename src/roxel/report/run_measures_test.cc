@@ -140,14 +140,17 @@ TEST(RunMeasures, SkyDebrisIsThereWhereItWasMeasured) {
   EXPECT_FALSE(to_json(m).contains("sky_debris"));
   SkyDebris debris;
   debris.opacity_threshold = 0.04;
-  debris.all = {400, 100.0}, debris.in_the_open = {100, 10.0}, debris.before_sky = {1, 0.5};
+  debris.all = {400, 100.0}, debris.in_the_open = {100, 10.0}, debris.above_all = {2, 3.0},
+  debris.before_sky = {1, 0.5};
   m.debris = {debris};
   const auto json = to_json(m)["sky_debris"][0];
   EXPECT_EQ(json["in_the_open"]["share"], 0.25);
+  EXPECT_EQ(json["above_all"]["share_of_opacity"], 0.03);
   EXPECT_EQ(json["before_sky"]["voxels"], 1);
   EXPECT_EQ(json["before_sky"]["share_of_opacity"], 0.005);
-  EXPECT_THAT(to_text(m), HasSubstr("| >= 0.04 | 400 | 100 | 25.000 | 10.000 | 1 | 0.250 | 0.500 |"));
-  EXPECT_THAT(csv_tables(m)[0].second, HasSubstr("\n0.04,400,100,0.25,0.1,1,0.0025,0.005\n"));
+  EXPECT_THAT(to_text(m),
+              HasSubstr("| >= 0.04 | 400 | 100 | 25.000 | 10.000 | 2 | 0.500 | 3.000 | 1 | 0.250 | 0.500 |"));
+  EXPECT_THAT(csv_tables(m)[0].second, HasSubstr("\n0.04,400,100,0.25,0.1,2,0.005,0.03,1,0.0025,0.005\n"));
 }
 
 TEST(RunMeasures, ANodeWithoutLightHasNoErrors) {

@@ -230,8 +230,11 @@ TEST(NodesWithoutASky, DoNotBuildTheirSky) {
     };
   };
   // A mask that calls all of a photograph object has voxels built before its sky: this test can fail.
-  EXPECT_GT(opacity_beside_cube(dataset, loader(true), daylight), 0.9);
-  EXPECT_LT(opacity_beside_cube(dataset, loader(false), daylight), 0.3);
+  // Half of that is emptied in the end, as the other photographs show sky there.
+  const double all_object = opacity_beside_cube(dataset, loader(true), daylight);
+  const double unknown = opacity_beside_cube(dataset, loader(false), daylight);
+  EXPECT_GT(all_object, 0.4);
+  EXPECT_LT(unknown, 0.2) << all_object;
 }
 
 }  // namespace
