@@ -15,11 +15,15 @@ constexpr double kMarginPixels = 0.5;
 /// How many pixels of any rectangle are surely sky: sums over all pixels above and to the left.
 class SkyCount {
  public:
-  explicit SkyCount(const Mask& foreground)
-      : width_(foreground.width()), height_(foreground.height()), sums_((width_ + 1) * (height_ + 1), 0) {
+  explicit SkyCount(const Photograph& photo)
+      : width_(photo.foreground.width()),
+        height_(photo.foreground.height()),
+        sums_((width_ + 1) * (height_ + 1), 0) {
     for (std::int64_t y = 0; y < height_; ++y)
       for (std::int64_t x = 0; x < width_; ++x) {
-        const bool sky = foreground.data()[y * width_ + x] <= kSurelySky;
+        const std::int64_t i = y * width_ + x;
+        const bool seen = photo.valid.empty() || photo.valid.data()[i] == 255;  // not beyond the lens
+        const bool sky = seen && photo.foreground.data()[i] <= kSurelySky;
         at(x + 1, y + 1) = at(x, y + 1) + at(x + 1, y) - at(x, y) + sky;
       }
   }
@@ -100,7 +104,7 @@ std::int64_t carve_sky(const Dataset& dataset, const PhotographLoader& load,
     if (!sky_masked[v]) continue;
     const Photograph photo = load(dataset.views[v]);
     if (photo.foreground.empty()) continue;
-    const SkyView view{dataset.views[v].camera, SkyCount(photo.foreground)};
+    const SkyView view{dataset.views[v].camera, SkyCount(photo)};
     for (int lattice = 0; lattice < volume.lattice_count(); ++lattice) {
       const BrickIndex& index = volume.index(lattice);
       parallel_for_blocks(std::ssize(index.bricks()), kGrain, context.thread_count(),

@@ -13,9 +13,10 @@
 namespace roxel {
 
 /// Empties every voxel whose whole footprint in one of the photographs is sky: the rectangle around its eight
-/// corners and half a pixel more, within the image, each pixel background to at least 98 %. `sky_masked`, one
-/// a view, 1: its mask is one of the sky; other views say nothing. An emptied voxel has tau 0 and no hits;
-/// colours and confidence stay. Returns how many had any opacity. The same for any number of threads.
+/// corners and half a pixel more, within the image, each pixel valid and background to at least 98 %.
+/// `sky_masked`, one a view, 1: its mask is one of the sky; other views say nothing. An emptied voxel has tau
+/// 0 and no hits; colours and confidence stay. Returns how many had any opacity. The same for any number of
+/// threads.
 std::int64_t carve_sky(const Dataset& dataset, const PhotographLoader& load,
                        const std::vector<std::uint8_t>& sky_masked, UpdateRule rule,
                        const RunContext& context, Volume& volume);

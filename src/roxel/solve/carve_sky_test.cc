@@ -92,6 +92,19 @@ TEST(CarveSky, LeavesWhatIsPartlyOutsideTheImage) {
   }
 }
 
+TEST(CarveSky, LeavesWhatTheLensDoesNotReach) {
+  const auto load = [](const View&) {
+    Photograph photo = sky_above(50);
+    photo.valid = Mask(kSide, kSide);
+    for (int x = 0; x < kSide; ++x) photo.valid.at(x, 20) = 0;
+    return photo;
+  };
+  Volume volume = full_volume();
+  carve_sky(two_cameras(), load, {1, 0}, UpdateRule::kPosterior, RunContext(1), volume);
+  EXPECT_EQ(tau_at(volume, {0.05, -1.15, 0.05}), 0.5f);  // rows 20 to 24
+  EXPECT_EQ(tau_at(volume, {0.05, -0.75, 0.05}), 0);
+}
+
 TEST(CarveSky, AsksOnlyViewsWhoseMaskIsOfTheSky) {
   EXPECT_EQ(tau_at(carved(50, {0, 0}), {0.05, -0.75, 0.05}), 0.5f);
   EXPECT_EQ(tau_at(carved(50, {0, 1}), {0.05, -0.75, 0.05}), 0);
