@@ -20,11 +20,11 @@ struct Piece {
 
 Piece piece_of(const Volume& whole, const std::vector<ColorTotals>& totals, const Brick& brick) {
   BrickMask mask;
-  for (int v = 0; v < kBrickVoxels; ++v) mask[v] = brick.local[v] != kNoVoxel;
+  for (int v = 0; v < kBrickVoxels; ++v) mask[v] = brick.has(v);
   Topology topology(whole.index(0).frame());
   topology.insert_brick(brick.coord, mask);
   Piece piece{Volume({topology}), {}, brick.first_slot};
-  for (std::uint32_t slot = 0; slot < brick.count; ++slot) {
+  for (std::uint32_t slot = 0; slot < brick.count(); ++slot) {
     piece.volume.tau[slot] = whole.tau[brick.first_slot + slot];
     piece.totals.push_back(totals[brick.first_slot + slot]);
   }

@@ -123,12 +123,10 @@ ROXEL_KERNEL void add_opacities(const VoxelScratch* voxels, std::uint32_t count,
   }
 }
 
-ROXEL_KERNEL void make_colors(const ColorTotals* totals, std::int64_t count, VoxelColor* colors) {
-  for (std::int64_t i = 0; i < count; ++i) {
-    EightTotals sums;
-    load(totals[i].data() + 1, sums);
-    color_of_sums(totals[i][0], sums, totals[i][9], colors[i].mean);
-  }
+ROXEL_KERNEL void make_color(const ColorTotals& totals, VoxelColor& color) {
+  EightTotals sums;
+  load(totals.data() + 1, sums);
+  color_of_sums(totals[0], sums, totals[9], color.mean);
 }
 
 /// Makes a voxel hold what the other nodes say: the totals less its own sums.
@@ -140,38 +138,58 @@ inline __attribute__((always_inline)) void leave_out(const ColorTotals& totals, 
   color_of_sums(totals[0] - own.weight, sums - own.sums, totals[9] - own.yz, voxel.mean);
 }
 
-ROXEL_KERNEL void leave_out_own(const ColorTotals& totals, VoxelScratch& voxel) { leave_out(totals, voxel); }
+/// Makes a voxel hold the totals' colour.
+inline __attribute__((always_inline)) void look_up(const ColorTotals& totals, VoxelScratch& voxel) {
+  EightTotals sums;
+  load(totals.data() + 1, sums);
+  color_of_sums(totals[0], sums, totals[9], voxel.mean);
+}
 
-/// The same of the entries' voxels, whose sums the entries are.
-ROXEL_KERNEL void leave_out_entries(const ColorTotals* totals, const OwnColors::Entry* entries,
-                                    std::uint32_t count, VoxelScratch* voxels) {
+/// Voxels with a node's own sums get what the others say, and no opacity sums.
+ROXEL_KERNEL void leave_out_own(const ColorTotals* totals, std::uint32_t count, VoxelScratch* voxels) {
   for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint32_t slot = entries[i].slot;
-    Floats low;
-    load(entries[i].color.mean, low);
-    store(low, voxels[slot].mean);
-    voxels[slot].cov[5] = entries[i].color.cov[5];
-    voxels[slot].evidence = entries[i].color.evidence;
-    leave_out(totals[slot], voxels[slot]);
+    if (voxels[i].evidence > 0)
+      leave_out(totals[i], voxels[i]);
+    else
+      look_up(totals[i], voxels[i]);
+    voxels[i].hits = voxels[i].exposure = voxels[i].looked = 0;
   }
 }
 
-/// Sets voxels up that hold no sums yet: their tau, and `colors`, unless null.
-ROXEL_KERNEL void set_up(const float* tau, const VoxelColor* colors, std::uint32_t count,
+/// Sets voxels up that hold no sums yet: their tau, and the totals' colours, unless null.
+ROXEL_KERNEL void set_up(const float* tau, const ColorTotals* totals, std::uint32_t count,
                          VoxelScratch* voxels) {
   static_assert(offsetof(VoxelScratch, evidence) == 9 * sizeof(float) &&
                 offsetof(VoxelScratch, tau) == 10 * sizeof(float) &&
                 sizeof(VoxelScratch) == 2 * sizeof(Floats));
   for (std::uint32_t i = 0; i < count; ++i) {
-    Floats low{}, high{};
-    if (colors) {
-      load(colors[i].mean, low);
-      high[0] = colors[i].cov[5];
-      high[1] = colors[i].evidence;
-    }
-    high[2] = tau[i];
+    const Floats low{}, high = {0, 0, tau[i]};
     store(low, voxels[i].mean);
     store(high, voxels[i].mean + kLanes);
+    if (totals) look_up(totals[i], voxels[i]);
+  }
+}
+
+/// The same, without what the node itself says of the brick whose first slot is given: its entries.
+ROXEL_KERNEL void set_up_others(const float* tau, const ColorTotals* totals, std::uint32_t first_slot,
+                                std::uint32_t count, const OwnColors::Entry* entries,
+                                std::uint32_t entry_count, VoxelScratch* voxels) {
+  const OwnColors::Entry* const end = entries + entry_count;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Floats low{}, high = {0, 0, tau[i]};
+    const bool has_own = entries < end && entries->slot == first_slot + i;
+    if (has_own) {
+      load(entries->color.mean, low);
+      high[0] = entries->color.cov[5];
+      high[1] = entries->color.evidence;
+      ++entries;
+    }
+    store(low, voxels[i].mean);
+    store(high, voxels[i].mean + kLanes);
+    if (has_own)
+      leave_out(totals[i], voxels[i]);
+    else
+      look_up(totals[i], voxels[i]);
   }
 }
 
@@ -179,7 +197,7 @@ template <class Visit>
 void for_each_entered_slot(const LatticeStack& stack, const NodeScratch& node, Visit&& visit) {
   for (const std::uint32_t number : node.entered_bricks()) {
     const Brick& brick = stack.brick(number);
-    visit(number, brick.first_slot, brick.first_slot + brick.count);
+    visit(number, brick.first_slot, brick.first_slot + brick.count());
   }
 }
 
@@ -192,19 +210,15 @@ NodeScratch::NodeScratch(const LatticeStack& stack, const std::vector<float>& ta
       entered_(stack.brick_count(), 0) {}
 
 void NodeScratch::set_up_brick(std::uint32_t number) {
-  entered_[number] = 1;
-  order_.push_back(number);
-  const Brick& brick = stack_->brick(number);
+  const Brick& brick = note(number);
   const std::uint32_t first = brick.first_slot;
-  set_up(tau_ + first, colors_ ? colors_ + first : nullptr, brick.count, &voxels_[first]);
-  if (totals_ && !colors_)
-    for (std::uint32_t slot = first; slot < first + brick.count; ++slot) look_up(slot, voxels_[slot]);
+  set_up(tau_ + first, totals_ ? totals_ + first : nullptr, brick.count(), &voxels_[first]);
 }
 
-void NodeScratch::look_up(std::uint32_t slot, VoxelScratch& voxel) const {
-  VoxelColor color;
-  if (!colors_) make_colors(&totals_[slot], 1, &color);
-  std::memcpy(static_cast<void*>(&voxel), colors_ ? &colors_[slot] : &color, sizeof(VoxelColor));
+const Brick& NodeScratch::note(std::uint32_t number) {
+  entered_[number] = 1;
+  order_.push_back(number);
+  return stack_->brick(number);
 }
 
 OwnColors::Entry OwnColors::Entry::of(std::uint32_t slot, const VoxelScratch& voxel) {
@@ -213,30 +227,21 @@ OwnColors::Entry OwnColors::Entry::of(std::uint32_t slot, const VoxelScratch& vo
   return entry;
 }
 
-void NodeScratch::compare_with(const std::vector<ColorTotals>& totals,
-                               const std::vector<VoxelColor>* colors) {
+void NodeScratch::compare_with(const std::vector<ColorTotals>& totals) {
   totals_ = totals.data();
-  colors_ = colors ? colors->data() : nullptr;
   for_each_entered_slot(*stack_, *this, [&](std::uint32_t, std::uint32_t begin, std::uint32_t end) {
-    for (std::uint32_t slot = begin; slot < end; ++slot) {
-      VoxelScratch& voxel = voxels_[slot];
-      if (voxel.evidence > 0) {
-        leave_out_own(totals_[slot], voxel);
-      } else {
-        look_up(slot, voxel);
-      }
-      voxel.hits = voxel.exposure = voxel.looked = 0;
-    }
+    leave_out_own(totals_ + begin, end - begin, &voxels_[begin]);
   });
 }
 
-void NodeScratch::compare_with(const std::vector<ColorTotals>& totals, const std::vector<VoxelColor>* colors,
-                               const OwnColors& own) {
-  compare_with(totals, colors);
+void NodeScratch::compare_with(const std::vector<ColorTotals>& totals, const OwnColors& own) {
+  ROXEL_CHECK(order_.empty());
+  totals_ = totals.data();
   const OwnColors::Entry* entry = own.entries.data();
   for (const OwnColors::BrickPart& part : own.bricks) {
-    enter(part.brick);
-    leave_out_entries(totals_, entry, part.count, voxels_.get());
+    const Brick& brick = note(part.brick);
+    const std::uint32_t first = brick.first_slot;
+    set_up_others(tau_ + first, totals_ + first, first, brick.count(), entry, part.count, &voxels_[first]);
     entry += part.count;
   }
 }
@@ -245,7 +250,6 @@ void NodeScratch::reset() {
   for (const std::uint32_t number : order_) entered_[number] = 0;
   order_.clear();
   totals_ = nullptr;
-  colors_ = nullptr;
 }
 
 void NodeScratch::reset(const LatticeStack& stack, const std::vector<float>& tau) {
@@ -281,7 +285,7 @@ void Totals::clear_opacity() { std::fill(opacity.begin(), opacity.end(), Opacity
 void Totals::add_color(const LatticeStack& stack, const NodeScratch& node, OwnColors* own) {
   if (own) {  // room for all, of which only what is written takes memory
     std::size_t entered = 0;
-    for (const std::uint32_t number : node.entered_bricks()) entered += stack.brick(number).count;
+    for (const std::uint32_t number : node.entered_bricks()) entered += stack.brick(number).count();
     own->entries.reserve(entered);
   }
   for_each_entered_slot(stack, node, [&](std::uint32_t brick, std::uint32_t begin, std::uint32_t end) {
@@ -305,19 +309,10 @@ void Totals::add_opacity(const LatticeStack& stack, const NodeScratch& node) {
   });
 }
 
-void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& weight) {
+VoxelColor color_of(const ColorTotals& totals) {
   VoxelColor color;
-  make_colors(&totals, 1, &color);
-  std::copy(color.mean, color.mean + 3, mean);
-  std::copy(color.cov, color.cov + 6, cov);
-  weight = color.evidence;
-}
-
-void colors_of(const std::vector<ColorTotals>& totals, int threads, std::vector<VoxelColor>& colors) {
-  colors.resize(totals.size());
-  parallel_for_blocks(totals.size(), 1 << 14, threads, [&](std::int64_t begin, std::int64_t end, int) {
-    make_colors(&totals[begin], end - begin, &colors[begin]);
-  });
+  make_color(totals, color);
+  return color;
 }
 
 }  // namespace roxel

@@ -75,18 +75,16 @@ class NodeScratch {
   const VoxelScratch& operator[](std::uint32_t slot) const { return voxels_[slot]; }
   const VoxelScratch* voxels() const { return voxels_.get(); }
   VoxelScratch* voxels() { return voxels_.get(); }
-  /// Sets up the brick's voxels if this node has not been here before: their tau, no sums, and the colours of
-  /// compare_with, if any.
+  /// Sets up the brick's voxels if this node has not been here before: their tau, no sums, and the totals'
+  /// colours after compare_with.
   void enter(std::uint32_t brick) {
     if (!entered_[brick]) set_up_brick(brick);
   }
   /// Turns all entered voxels from the node's own colour sums into what the *other* nodes say (the totals
   /// less the node's own, capped); bricks entered from now on get the totals, and opacity sums start at 0.
-  /// `colors` is color_of of all totals, when someone has it.
-  void compare_with(const std::vector<ColorTotals>& totals, const std::vector<VoxelColor>* colors = nullptr);
+  void compare_with(const std::vector<ColorTotals>& totals);
   /// The same for a scratch that has been reset, with the node's own colour sums from Totals::add_color.
-  void compare_with(const std::vector<ColorTotals>& totals, const std::vector<VoxelColor>* colors,
-                    const OwnColors& own);
+  void compare_with(const std::vector<ColorTotals>& totals, const OwnColors& own);
   const std::vector<std::uint32_t>& entered_bricks() const { return order_; }
   /// Forgets the node.
   void reset();
@@ -95,12 +93,11 @@ class NodeScratch {
 
  private:
   void set_up_brick(std::uint32_t brick);
-  void look_up(std::uint32_t slot, VoxelScratch& voxel) const;
+  const Brick& note(std::uint32_t brick);
 
   const LatticeStack* stack_;
   const float* tau_;
   const ColorTotals* totals_ = nullptr;
-  const VoxelColor* colors_ = nullptr;
   std::unique_ptr<VoxelScratch[]> voxels_;
   std::vector<std::uint8_t> entered_;
   std::vector<std::uint32_t> order_;
@@ -130,7 +127,6 @@ class Totals {
 };
 
 /// Mean, covariance and weight of fixed-point colour sums; all zero without weight.
-void color_of(const ColorTotals& totals, float mean[3], float cov[6], float& weight);
-void colors_of(const std::vector<ColorTotals>& totals, int threads, std::vector<VoxelColor>& colors);
+VoxelColor color_of(const ColorTotals& totals);
 
 }  // namespace roxel

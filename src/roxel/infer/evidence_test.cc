@@ -169,11 +169,10 @@ TEST(Totals, LeavingANodeOutLeavesExactlyTheOthers) {
       ColorTotals others{};
       for (int n = 0; n < kNodes; ++n)
         for (int c = 0; c < 10; ++c) others[c] += n == left_out ? 0 : own[n][slot][c];
-      float mean[3], cov[6], w;
-      color_of(others, mean, cov, w);
-      EXPECT_EQ(scratch[slot].evidence, w);
-      for (int c = 0; c < 3; ++c) EXPECT_EQ(scratch[slot].mean[c], mean[c]);
-      for (int c = 0; c < 6; ++c) EXPECT_EQ(scratch[slot].cov[c], cov[c]);
+      const VoxelColor expected = color_of(others);
+      EXPECT_EQ(scratch[slot].evidence, expected.evidence);
+      for (int c = 0; c < 3; ++c) EXPECT_EQ(scratch[slot].mean[c], expected.mean[c]);
+      for (int c = 0; c < 6; ++c) EXPECT_EQ(scratch[slot].cov[c], expected.cov[c]);
       EXPECT_EQ(scratch[slot].hits, 0);
     }
   }
@@ -251,8 +250,8 @@ TEST(ColorOf, CovarianceOfFewColoursIsRightAndSemiDefinite) {
       colors.emplace_back(component(random), component(random), component(random));
       weights.push_back(unit(random));
     }
-    float mean[3], cov[6], weight;
-    color_of(totals_of(colors, weights), mean, cov, weight);
+    const VoxelColor color = color_of(totals_of(colors, weights));
+    const float* const cov = color.cov;
     double total = 0;
     Eigen::Vector3d m = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < colors.size(); ++i) total += weights[i], m += weights[i] * colors[i];
@@ -262,19 +261,18 @@ TEST(ColorOf, CovarianceOfFewColoursIsRightAndSemiDefinite) {
       s += weights[i] / total * (colors[i] - m) * (colors[i] - m).transpose();
     Eigen::Matrix3d got;
     got << cov[0], cov[3], cov[4], cov[3], cov[1], cov[5], cov[4], cov[5], cov[2];
-    EXPECT_NEAR(weight, total, 1e-6);
-    for (int c = 0; c < 3; ++c) ASSERT_NEAR(mean[c], m[c], 1e-4);
+    EXPECT_NEAR(color.evidence, total, 1e-6);
+    for (int c = 0; c < 3; ++c) ASSERT_NEAR(color.mean[c], m[c], 1e-4);
     ASSERT_LT((got - s).norm(), 1e-3 * s.norm()) << got << "\n\n" << s;
     ASSERT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(got).eigenvalues()[0], -1e-6 * s.norm());
   }
 }
 
 TEST(ColorOf, NoWeightIsAllZero) {
-  float mean[3] = {1, 1, 1}, cov[6] = {1, 1, 1, 1, 1, 1}, weight = 1;
-  color_of({}, mean, cov, weight);
-  EXPECT_EQ(weight, 0);
-  for (const float m : mean) EXPECT_EQ(m, 0);
-  for (const float s : cov) EXPECT_EQ(s, 0);
+  const VoxelColor color = color_of({});
+  EXPECT_EQ(color.evidence, 0);
+  for (const float m : color.mean) EXPECT_EQ(m, 0);
+  for (const float s : color.cov) EXPECT_EQ(s, 0);
 }
 
 }  // namespace

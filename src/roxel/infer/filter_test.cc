@@ -231,7 +231,7 @@ TEST(FilteredColors, StayNumbersBehindManyVoxelsOfOtherColours) {
     EXPECT_GT(scratch[0].evidence, 0.1f);
     for (const std::uint32_t number : scratch.entered_bricks()) {
       const Brick& brick = stack.brick(number);
-      for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count; ++slot)
+      for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count(); ++slot)
         for (int c = 0; c < 6; ++c) ASSERT_LT(std::abs(scratch[slot].cov[c]), 1e9f) << slot;
     }
   }

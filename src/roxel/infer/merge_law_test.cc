@@ -47,7 +47,7 @@ class MergeLaw : public ::testing::TestWithParam<UpdateRule> {
     Volume volume = start_;
     update_opacity(GetParam(), totals, prior_opacity_field(start_, options_.prior, 1),
                    options_.prior.strength, 1, volume);
-    update_color(own.of_totals, 1, volume);
+    update_color(own.totals.color, 1, volume);
     return volume;
   }
 

@@ -190,7 +190,7 @@ TEST(MarchColor, WeighsSamplesByTheirForeground) {
     march_color(stack, node, MarchOptions(), false, RunContext(1), scratch);
     double sum = 0;
     for (const std::uint32_t brick : scratch.entered_bricks())
-      for (std::uint32_t v = 0; v < stack.brick(brick).count; ++v)
+      for (std::uint32_t v = 0; v < stack.brick(brick).count(); ++v)
         sum += scratch[stack.brick(brick).first_slot + v].evidence;
     return sum;
   };

@@ -92,7 +92,6 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
     if (own) colors.kept.keep(node);
     return node_counts;
   }));
-  colors_of(colors.totals.color, context.thread_count(), colors.of_totals);
   colors.march_cpu_seconds = std::accumulate(march_seconds.begin(), march_seconds.end(), 0.0);
   return counts;
 }
@@ -101,9 +100,9 @@ void compare_with_others(const LatticeStack& stack, const SampleNode& views, std
                          const PassOptions& options, const CollectedColors& colors, const RunContext& context,
                          NodeScratch& scratch) {
   const OwnColors* own = options.predictive ? colors.kept.of(node_idx) : nullptr;
-  if (own) return scratch.compare_with(colors.totals.color, &colors.of_totals, *own);
+  if (own) return scratch.compare_with(colors.totals.color, *own);
   if (options.predictive) march_color(stack, views, options.opacity, options.everywhere, context, scratch);
-  scratch.compare_with(colors.totals.color, &colors.of_totals);
+  scratch.compare_with(colors.totals.color);
 }
 
 KeptColors::KeptColors(std::size_t node_count, std::size_t limit_bytes)
@@ -191,7 +190,7 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
   report.prior_log_likelihood = log_prior(volume, field, options.prior.strength);
   report.update = update_opacity(options.opacity.rule, totals, field, options.prior.strength,
                                  context.thread_count(), volume, acceleration);
-  update_color(colors.of_totals, context.thread_count(), volume);
+  update_color(totals.color, context.thread_count(), volume);
   return report;
 }
 

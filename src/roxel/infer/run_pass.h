@@ -63,7 +63,6 @@ struct CollectedColors {
 
   Totals totals;
   KeptColors kept;
-  std::vector<VoxelColor> of_totals;
   double march_cpu_seconds = 0;  ///< of the marches that made them, summed over workers
 };
 

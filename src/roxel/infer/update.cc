@@ -60,15 +60,10 @@ void sheet_prior_of_brick(const BrickIndex& index, int brick_idx, const std::vec
   const float lambda = static_cast<float>(prior.spatial_lambda);
   const float power = static_cast<float>(prior.sharpness);
   const float base = (1 - lambda) * static_cast<float>(prior.opacity);
-  for (int k = 0; k < kBrickSide; ++k)
-    for (int j = 0; j < kBrickSide; ++j)
-      for (int i = 0; i < kBrickSide; ++i) {
-        const std::uint16_t voxel = brick.local[voxel_in_brick(i, j, k)];
-        if (voxel == kNoVoxel) continue;
-        const float* centre = block + voxel_in_block(i, j, k);
-        const float sheet = sheet_opacity(centre);
-        field[brick.first_slot + voxel] = base + lambda * (power > 1 ? sharpened(sheet, power) : sheet);
-      }
+  brick.for_each_voxel([&](int v, std::uint32_t slot) {
+    const float sheet = sheet_opacity(block + voxel_in_block(v % 8, v / 8 % 8, v / 64));
+    field[slot] = base + lambda * (power > 1 ? sharpened(sheet, power) : sheet);
+  });
 }
 
 }  // namespace
@@ -134,10 +129,10 @@ UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::ve
   return {all.looked ? all.change / all.looked : 0, count ? all.opacity / count : 0};
 }
 
-void update_color(const std::vector<VoxelColor>& colors, int threads, Volume& volume) {
+void update_color(const std::vector<ColorTotals>& totals, int threads, Volume& volume) {
   parallel_for_blocks(volume.slot_count(), kGrain, threads, [&](std::int64_t begin, std::int64_t end, int) {
     for (std::int64_t slot = begin; slot < end; ++slot) {
-      const VoxelColor& color = colors[slot];
+      const VoxelColor color = color_of(totals[slot]);
       if (color.evidence <= 0) continue;
       std::copy(color.mean, color.mean + 3, volume.color_mean[slot].begin());
       std::copy(color.cov, color.cov + 6, volume.color_cov[slot].begin());

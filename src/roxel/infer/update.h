@@ -38,7 +38,7 @@ UpdateReport update_opacity(UpdateRule rule, const Totals& totals, const std::ve
                             double prior_strength, int threads, Volume& volume,
                             Acceleration* acceleration = nullptr);
 
-/// Sets the colour channels from colors_of the totals; voxels without evidence keep what they have.
-void update_color(const std::vector<VoxelColor>& colors, int threads, Volume& volume);
+/// Sets the colour channels from the totals; voxels without evidence keep what they have.
+void update_color(const std::vector<ColorTotals>& totals, int threads, Volume& volume);
 
 }  // namespace roxel

@@ -208,9 +208,7 @@ TEST(UpdateColor, SetsWhatIsSeenAndKeepsTheRest) {
   row.volume.color_weight[1] = 3;
   const std::int64_t half = 1 << 23;  // weight 1/2
   row.totals.color[0] = {half, 10 * half, 20 * half, 0, 150 * half, 410 * half, 0, 200 * half, 0, 0};
-  std::vector<VoxelColor> colors;
-  colors_of(row.totals.color, 1, colors);
-  update_color(colors, 1, row.volume);
+  update_color(row.totals.color, 1, row.volume);
   EXPECT_FLOAT_EQ(row.volume.color_weight[0], 0.5f);
   EXPECT_FLOAT_EQ(row.volume.color_mean[0][0], 10);
   EXPECT_FLOAT_EQ(row.volume.color_mean[0][1], 20);

@@ -42,8 +42,7 @@ openvdb::Index swap_order(int n) { return (n >> 6) | (n & 0x38) | ((n & 7) << 6)
 
 template <class Visit>
 void for_each_voxel(const Brick& brick, Visit visit) {
-  for (int v = 0; v < kBrickVoxels; ++v)
-    if (brick.local[v] != kNoVoxel) visit(swap_order(v), brick.first_slot + brick.local[v]);
+  brick.for_each_voxel([&](int v, std::uint32_t slot) { visit(swap_order(v), slot); });
 }
 
 // ---------------------------------------------------------------------------------------------- writing

@@ -83,7 +83,7 @@ void expect_equal(const Volume& a, const Volume& b) {
     ASSERT_EQ(a.index(k).bricks().size(), b.index(k).bricks().size());
     for (std::size_t i = 0; i < a.index(k).bricks().size(); ++i) {
       EXPECT_EQ(a.index(k).bricks()[i].coord, b.index(k).bricks()[i].coord);
-      EXPECT_EQ(a.index(k).bricks()[i].local, b.index(k).bricks()[i].local);
+      EXPECT_EQ(a.index(k).bricks()[i].word, b.index(k).bricks()[i].word);
     }
   }
 }

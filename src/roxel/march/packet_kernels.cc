@@ -181,7 +181,7 @@ struct FewBricks {
   static constexpr int kMost = kRays == kWords ? 4 : 0;
 
   int count = 0;  ///< 0: they are more than kMost, or there are none
-  const BrickBits* bits[kMost + 1];
+  const Brick* brick[kMost + 1];
   std::uint32_t rays[kMost + 1] = {};  ///< bit `ray`: its crossing is in that brick
 };
 
@@ -190,8 +190,8 @@ HWY_INLINE FewBricks few_bricks(const BrickCrossings& crossings) {
   for (int ray = 0; ray < kRays && FewBricks::kMost > 0; ++ray) {
     if (crossings.count[ray] == 0) continue;
     int which = 0;
-    few.bits[few.count] = crossings.bits[ray];
-    while (few.bits[which] != crossings.bits[ray]) ++which;
+    few.brick[few.count] = crossings.brick[ray];
+    while (few.brick[which] != crossings.brick[ray]) ++which;
     if (which == FewBricks::kMost) return {};
     few.rays[which] |= 1u << ray;
     few.count = std::max(few.count, which + 1);
@@ -199,7 +199,7 @@ HWY_INLINE FewBricks few_bricks(const BrickCrossings& crossings) {
   return few;
 }
 
-/// Where each ray's BrickBits are, in bytes from those of one of them.
+/// Where each ray's brick is, in bytes from those of one of them.
 struct alignas(64) BitTables {
   std::int32_t offset[kMaxPacketRays];
   const std::int32_t* base = nullptr;
@@ -212,7 +212,7 @@ HWY_INLINE void find_tables(const BrickCrossings& crossings, BitTables& tables) 
   for (int ray = 0; ray < kRays; ++ray) {
     tables.offset[ray] = 0;
     if (crossings.count[ray] == 0) continue;
-    const char* const bits = reinterpret_cast<const char*>(crossings.bits[ray]);
+    const char* const bits = reinterpret_cast<const char*>(crossings.brick[ray]);
     if (!base) base = bits;
     const std::int64_t offset = bits - base;
     tables.near &= offset > -kFar && offset < kFar;
@@ -284,7 +284,7 @@ HWY_INLINE void look_up_few(const FewBricks& bricks, int rows, const BrickCrossi
   hn::Mask<IntTag> rays[kMost];
   auto brick_of_ray = hn::Zero(di);
   for (int b = 0; b < bricks.count; ++b) {
-    const BrickBits& brick = *bricks.bits[b];
+    const Brick& brick = *bricks.brick[b];
     words[b] = hn::Load(di, reinterpret_cast<const std::int32_t*>(brick.word.data()));
     first[b] = hn::Add(hn::PromoteTo(di, hn::LoadU(du16, brick.before.data())),
                        hn::Set(di, static_cast<std::int32_t>(brick.first_slot)));
@@ -314,7 +314,7 @@ HWY_INLINE void look_up_few(const FewBricks& bricks, int rows, const BrickCrossi
 
 /// The same of any crossings.
 HWY_INLINE void look_up_any(int rows, BrickCrossings& crossings, PacketSteps& steps) {
-  static_assert(offsetof(BrickBits, word) == 0);
+  static_assert(offsetof(Brick, word) == 0);
   const IntTag di;
   BitTables tables;
   find_tables(crossings, tables);
@@ -329,7 +329,7 @@ HWY_INLINE void look_up_any(int rows, BrickCrossings& crossings, PacketSteps& st
         },
         steps);
     // An entry is two bytes: it is read with the two before it.
-    const auto before_offset = hn::Set(di, static_cast<std::int32_t>(offsetof(BrickBits, before)) - 2);
+    const auto before_offset = hn::Set(di, static_cast<std::int32_t>(offsetof(Brick, before)) - 2);
     find_slots(
         [&](auto ray, const IntVector& word) HWY_ATTR {
           const auto at =
@@ -347,7 +347,7 @@ HWY_INLINE void look_up_any(int rows, BrickCrossings& crossings, PacketSteps& st
         for (int ray = 0; ray < kRays; ++ray)
           words[ray] =
               row < crossings.count[ray]
-                  ? static_cast<std::int32_t>(crossings.bits[ray]->word[crossings.cell[row][ray] >> 5])
+                  ? static_cast<std::int32_t>(crossings.brick[ray]->word[crossings.cell[row][ray] >> 5])
                   : 0;
         return hn::Load(di, words);
       },
@@ -356,7 +356,7 @@ HWY_INLINE void look_up_any(int rows, BrickCrossings& crossings, PacketSteps& st
              steps);
   for (int i = 0; i < steps.count; ++i) {
     const int code = steps.ray[i];
-    steps.slot[i] += crossings.bits[code & (kMaxPacketRays - 1)]->before[code >> 9];
+    steps.slot[i] += crossings.brick[code & (kMaxPacketRays - 1)]->before[code >> 9];
   }
 }
 

@@ -44,7 +44,7 @@ struct alignas(64) BrickHits {
 struct alignas(64) BrickCrossings {
   double to_exit[3][kMaxPacketRays];  ///< as in BrickHits, in kPacketUnit of arc
   double length[kMaxPacketRays];      ///< 0: the ray crosses nothing
-  const BrickBits* bits[kMaxPacketRays];
+  const Brick* brick[kMaxPacketRays];
   std::int32_t first_slot[kMaxPacketRays];
 
   // Found:

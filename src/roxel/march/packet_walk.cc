@@ -11,7 +11,7 @@ namespace roxel {
 /// A brick that rays of the packet meet.
 struct PacketWalk::Found {
   std::uint32_t number;
-  const BrickBits* bits;
+  const Brick* brick;
   std::int32_t first_slot;
   double per_voxel;  ///< inverse of the lattice's voxel size
   internal::BrickHits hits;
@@ -76,11 +76,11 @@ void PacketWalk::look_for_bricks() {
     const BrickIndex& index = stack_.volume().index(lattice);
     const LatticeFrame& frame = index.frame();
     const std::uint32_t in_lattice = number - stack_.first_brick(lattice);
-    const BrickBits& brick = index.bits()[in_lattice];
+    const Brick& brick = index.bricks()[in_lattice];
     if (next_brick_ + 1 < bricks_.size())
       if (const std::uint32_t after = bricks_[next_brick_ + 1] - stack_.first_brick(lattice);
-          after < index.bits().size())
-        __builtin_prefetch(index.bits()[after].coord.data());
+          after < index.bricks().size())
+        __builtin_prefetch(index.bricks()[after].coord.data());
     const double side = kBrickSide * frame.voxel_size;
     double lo[3], hi[3];
     for (int a = 0; a < 3; ++a) {
@@ -92,7 +92,7 @@ void PacketWalk::look_for_bricks() {
         internal::meet_brick(s.rays, lo, hi, range_.begin, range_.end, found.hits) & running_;
     if (meet == 0) continue;
     found.number = number;
-    found.bits = &brick;
+    found.brick = &brick;
     __builtin_prefetch(brick.word.data());
     found.first_slot = static_cast<std::int32_t>(brick.first_slot);
     found.per_voxel = 1 / frame.voxel_size;
@@ -120,7 +120,7 @@ void PacketWalk::take_next_crossings(PacketSteps& steps) {
     const double scale = s.rays.arc_per_depth[ray] * found.per_voxel;
     for (int a = 0; a < 3; ++a) c.to_exit[a][ray] = found.hits.to_exit[a][ray] * scale;
     c.length[ray] = std::max(found.hits.length[ray] * scale, 1.0);
-    c.bits[ray] = found.bits;
+    c.brick[ray] = found.brick;
     c.first_slot[ray] = found.first_slot;
     if (steps.brick_count == 0 || steps.bricks[steps.brick_count - 1] != found.number)
       steps.bricks[steps.brick_count++] = found.number;

@@ -135,7 +135,7 @@ TEST(PacketWalk, ARoundIsOneBrickARay) {
   RandomRays rays(volume.index(0).frame().box(), 10);
   const auto brick_of = [&](std::uint32_t slot) {
     std::uint32_t number = 0;
-    while (slot >= stack.brick(number).first_slot + stack.brick(number).count) ++number;
+    while (slot >= stack.brick(number).first_slot + stack.brick(number).count()) ++number;
     return number;
   };
   Packet packet(stack);

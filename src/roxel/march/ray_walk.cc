@@ -12,6 +12,16 @@ struct NearPoint {
   float rest[3];
 };
 
+ROXEL_KERNEL void add_bits(const std::uint32_t* words, int count, std::uint32_t* sums) {
+  const int padded = (count + 7) / 8 * 8;
+  for (int i = 0; i < padded; ++i) {  // side by side, as not every processor can count bits
+    std::uint32_t bits = words[i];
+    bits -= bits >> 1 & 0x55555555u;
+    bits = (bits & 0x33333333u) + (bits >> 2 & 0x33333333u);
+    sums[i] += (((bits + (bits >> 4)) & 0x0f0f0f0fu) * 0x01010101u) >> 24;
+  }
+}
+
 ROXEL_KERNEL void complete_steps(const CellCode* cells, const std::int32_t* units, int count,
                                  const float u[3], const NearPoint& near, float* lengths, float* weights) {
   using namespace internal;
@@ -43,6 +53,7 @@ void StepChunk::complete(const float direction[3], const double near[3]) {
     point.whole[a] = static_cast<std::int32_t>(whole) + internal::kCellOffset;
     point.rest[a] = static_cast<float>(near[a] - whole - 0.5);  // voxel centres are at + 0.5
   }
+  add_bits(below_, count, slot);
   complete_steps(cell, units, count, direction, point, length, weight);
 }
 

@@ -286,11 +286,13 @@ struct alignas(64) StepChunk {
 
  private:
   friend class LatticeStack;
-  /// Fills `length`, and `weight`: 1 - d / (sqrt(3)/2), d the distance of the ray's line from the voxel's
-  /// centre: 1 through the centre, 0 through a vertex. [Jethwa04] section 5.1.1. `direction` is the ray's
-  /// unit direction, `near` a point of it near the chunk, in voxels of the frame.
+  /// Adds the voxels before its own in its word to `slot`, and fills `length`, and `weight`: 1 - d /
+  /// (sqrt(3)/2), d the distance of the ray's line from the voxel's centre: 1 through the centre, 0 through a
+  /// vertex. [Jethwa04] section 5.1.1. `direction` is the ray's unit direction, `near` a point of it near the
+  /// chunk, in voxels of the frame.
   void complete(const float direction[3], const double near[3]);
   double depth_per_length_;
+  std::uint32_t below_[kSize];  ///< bits of the voxels before a step's in its word of Brick
 };
 
 /// What a walk needs of a volume, gathered once.
@@ -343,8 +345,7 @@ class LatticeStack {
           (ray.origin.x() + middle * ray.direction.x() - frame.origin.x()) / frame.voxel_size,
           (ray.origin.y() + middle * ray.direction.y() - frame.origin.y()) / frame.voxel_size,
           (ray.origin.z() + middle * ray.direction.z() - frame.origin.z()) / frame.voxel_size};
-      const std::uint16_t* local = nullptr;
-      std::uint32_t first_slot = 0;
+      const Brick* brick = nullptr;
       chunk.lattice = lattice;
       chunk.depth_per_length_ = frame.voxel_size * inverse_norm;
       chunk.depth_per_length = static_cast<float>(chunk.depth_per_length_);
@@ -354,9 +355,9 @@ class LatticeStack {
       const auto hand_over =
           [&unit, &near, &chunk, &on_chunk ](int count, int brick_count) __attribute__((noinline)) {
         chunk.count = count;
-        for (int pad = count; pad % StepChunk::kLanes != 0; ++pad) chunk.slot[pad] = chunk.slot[0];
         chunk.brick_count = brick_count;
         chunk.complete(unit, near);
+        for (int pad = count; pad % StepChunk::kLanes != 0; ++pad) chunk.slot[pad] = chunk.slot[0];
         return on_chunk(static_cast<const StepChunk&>(chunk));
       };
       const auto flush = [&]() __attribute__((always_inline)) {
@@ -370,8 +371,7 @@ class LatticeStack {
             table[bx + static_cast<std::size_t>(nx) * (by + static_cast<std::size_t>(ny) * bz)];
         if (found < 0) return AtBrick::kSkip;
         if (n >= StepChunk::kEnough && !flush()) return AtBrick::kStop;
-        local = bricks[found].local.data();
-        first_slot = bricks[found].first_slot;
+        brick = &bricks[found];
         last_brick += last_begin != n;
         last_begin = n;
         chunk.brick_begin[last_brick] = static_cast<std::uint8_t>(n);
@@ -382,9 +382,11 @@ class LatticeStack {
           __attribute__((always_inline)) {
         // Written whether there is a voxel or not, counted if there is: cheaper than a branch that is
         // mispredicted at every surface.
-        const std::uint16_t voxel = local[cell_in_brick(code)];
-        const std::ptrdiff_t exists = voxel != kNoVoxel;
-        chunk.slot[n] = first_slot + voxel;
+        const int voxel = cell_in_brick(code);
+        const std::uint32_t word = brick->word[voxel / 32], bit = std::uint32_t{1} << voxel % 32;
+        const std::ptrdiff_t exists = (word & bit) != 0;
+        chunk.slot[n] = brick->first_slot + brick->before[voxel / 32];
+        chunk.below_[n] = word & (bit - 1);
         chunk.units[n] = static_cast<std::int32_t>(out - in);
         chunk.middle[n] = in + out;
         chunk.cell[n] = code;

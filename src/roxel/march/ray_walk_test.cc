@@ -129,7 +129,7 @@ TEST(RayWalk, AnnouncesEachBrickBeforeItsFirstVoxel) {
           bool found = false;
           for (const std::uint32_t number : announced) {
             const Brick& brick = stack.brick(number);
-            found |= step.slot >= brick.first_slot && step.slot < brick.first_slot + brick.count;
+            found |= step.slot >= brick.first_slot && step.slot < brick.first_slot + brick.count();
           }
           in_last_announced &= found;
           return true;

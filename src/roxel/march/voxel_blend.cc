@@ -19,9 +19,13 @@ void find_cube(const BrickIndex& index, const Eigen::Vector3i& low, std::array<s
   if (found < 0) return;
   const Brick& voxels = index.bricks()[found];
   const int first = voxel_in_brick(in_brick.x(), in_brick.y(), in_brick.z());
-  for (int i = 0; i < 8; ++i) {
-    const std::uint16_t local = voxels.local[first + voxel_in_brick(i & 1, i >> 1 & 1, i >> 2)];
-    if (local != kNoVoxel) slots[i] = voxels.first_slot + local;
+  for (int i = 0; i < 8; i += 2) {  // both in a row: the second's slot follows the first's
+    const int v = first + voxel_in_brick(0, i >> 1 & 1, i >> 2);
+    const bool has_first = voxels.has(v), has_second = voxels.has(v + 1);
+    if (!has_first && !has_second) continue;
+    const std::uint32_t slot = voxels.slot(v);
+    if (has_first) slots[i] = slot;
+    if (has_second) slots[i + 1] = slot + has_first;
   }
 }
 

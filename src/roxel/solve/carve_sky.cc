@@ -84,12 +84,10 @@ void mark(const BrickIndex& index, const Brick& brick, const SkyView& view,
       0.5 *
       (frame.voxel_centre(first) + frame.voxel_centre(first + Eigen::Vector3i::Constant(kBrickSide - 1)));
   if (view.before(middle, kBrickSide * size) == SkyCount::Share::kNone) return;
-  for (int v = 0; v < kBrickVoxels; ++v) {
-    if (brick.local[v] == kNoVoxel) continue;
-    std::uint8_t& marked = before_sky[brick.first_slot + brick.local[v]];
-    const Eigen::Vector3i local(v % kBrickSide, v / kBrickSide % kBrickSide, v / (kBrickSide * kBrickSide));
-    if (!marked && view.before(frame.voxel_centre(first + local), size) == SkyCount::Share::kAll) marked = 1;
-  }
+  brick.for_each_voxel([&](int v, std::uint32_t slot) {
+    const Eigen::Vector3d centre = frame.voxel_centre(voxel_of(brick, v));
+    if (!before_sky[slot] && view.before(centre, size) == SkyCount::Share::kAll) before_sky[slot] = 1;
+  });
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ constexpr double kDraftCost = 0.45;  ///< of a pass on all samples
 
 // Bytes a voxel: channels of the volume, totals of a pass, and a worker's scratch.
 constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8 + 12;
-constexpr double kTotalsBytes = 80 + 24 + 40 + 8;
+constexpr double kTotalsBytes = 80 + 24 + 8;
 constexpr double kScratchBytes = 64;
 constexpr double kKeptShare = 0.6;  ///< of the voxels, for each node
 constexpr double kVoxelsPerBrick = 150;
@@ -120,7 +120,7 @@ struct LevelNeeds {
 LevelNeeds level_needs(const LevelEstimate& level, const SampleLoad& load, double largest_image, int nodes,
                        int threads) {
   const double bricks = level.voxels / kVoxelsPerBrick;
-  const double volume = level.voxels * kChannelBytes + bricks * (sizeof(Brick) + sizeof(BrickBits));
+  const double volume = level.voxels * kChannelBytes + bricks * sizeof(Brick);
   // Checkpoints are written, and last of all depth is made, beside what passes work in.
   const double passing =
       level.voxels * (kTotalsBytes + kScratchBytes * threads) + threads * bricks * kListedBytesPerBrick +

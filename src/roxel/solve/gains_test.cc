@@ -61,16 +61,13 @@ double mean_log_color(const Reconstruction& made) {
   double sum = 0;
   int count = 0;
   for (const Brick& brick : index.bricks())
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (brick.local[v] == kNoVoxel) continue;
-      const std::uint32_t slot = brick.first_slot + brick.local[v];
-      if (alpha_from_tau(made.volume.tau[slot]) < 0.5f || made.volume.color_weight[slot] <= 0) continue;
-      const Eigen::Vector3d at =
-          index.frame().voxel_centre(kBrickSide * brick.coord + Eigen::Vector3i(v % 8, v / 8 % 8, v / 64));
-      if (at.cwiseAbs().maxCoeff() > 0.5) continue;
+    brick.for_each_voxel([&](int v, std::uint32_t slot) {
+      if (alpha_from_tau(made.volume.tau[slot]) < 0.5f || made.volume.color_weight[slot] <= 0) return;
+      const Eigen::Vector3d at = index.frame().voxel_centre(voxel_of(brick, v));
+      if (at.cwiseAbs().maxCoeff() > 0.5) return;
       const std::array<float, 3> truth = CubeWorld::color_at(at);
       sum += std::log(std::max(1e-3f, colors[slot][1]) / truth[1]), ++count;
-    }
+    });
   return sum / count;
 }
 

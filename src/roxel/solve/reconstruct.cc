@@ -178,10 +178,10 @@ class LevelSamples {
         make_samples(dataset_, load_, in_passing, voxel_size_, options_, context_, SampleColors::kCanonical);
     CollectedColors colors(volume.slot_count(), samples.size(), 0);
     collect_color(stack, samples, pass, context_, nullptr, colors);
-    update_color(colors.of_totals, context_.thread_count(), volume);
+    update_color(colors.totals.color, context_.thread_count(), volume);
     for (std::uint32_t slot = 0; slot < volume.slot_count();
          ++slot)  // what none shows has only the other colour
-      if (colors.of_totals[slot].evidence <= 0) volume.color_weight[slot] = 0;
+      if (colors.totals.color[slot][0] <= 0) volume.color_weight[slot] = 0;
   }
 
  private:
@@ -517,11 +517,8 @@ void initialise_from(const Volume& initial, Volume& volume) {
   for (int k = 0; k < volume.lattice_count(); ++k) {
     const BrickIndex& index = volume.index(k);
     for (const Brick& brick : index.bricks())
-      for (int v = 0; v < kBrickVoxels; ++v) {
-        if (brick.local[v] == kNoVoxel) continue;
-        const std::uint32_t slot = brick.first_slot + brick.local[v];
-        const Eigen::Vector3i ijk = kBrickSide * brick.coord + Eigen::Vector3i(v % 8, v / 8 % 8, v / 64);
-        const Eigen::Vector3d centre = index.frame().voxel_centre(ijk);
+      brick.for_each_voxel([&](int v, std::uint32_t slot) {
+        const Eigen::Vector3d centre = index.frame().voxel_centre(voxel_of(brick, v));
         for (int source = 0; source < initial.lattice_count(); ++source) {
           const LatticeFrame& frame = initial.index(source).frame();
           const Eigen::Vector3d cell = (centre - frame.origin) / frame.voxel_size;
@@ -536,7 +533,7 @@ void initialise_from(const Volume& initial, Volume& volume) {
           volume.confidence[slot] = initial.confidence[from];
           break;
         }
-      }
+      });
   }
 }
 

@@ -46,14 +46,12 @@ SurfaceVoxels surface_voxels(const Volume& volume, float least_opacity,
   const float least_tau = tau_from_alpha(least_opacity);
   const BrickIndex& index = volume.index(0);
   for (const Brick& brick : index.bricks())
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const std::uint32_t slot = brick.first_slot + brick.local[v];
-      if (brick.local[v] == kNoVoxel || !(volume.tau[slot] >= least_tau)) continue;
+    brick.for_each_voxel([&](int v, std::uint32_t slot) {
+      if (!(volume.tau[slot] >= least_tau)) return;
       found.places[slot] = static_cast<std::int32_t>(found.slots.size());
       found.slots.push_back(slot);
-      found.centres.push_back(
-          index.frame().voxel_centre(kBrickSide * brick.coord + Eigen::Vector3i(v % 8, v / 8 % 8, v / 64)));
-    }
+      found.centres.push_back(index.frame().voxel_centre(voxel_of(brick, v)));
+    });
   const std::vector<Eigen::Vector3f> axes = surface_axes(volume, threads);
   for (const std::uint32_t slot : found.slots)
     found.normals.push_back(axes[slot].dot(towards[slot]) < 0 ? Eigen::Vector3f(-axes[slot]) : axes[slot]);

@@ -48,11 +48,8 @@ void for_each_voxel(const Volume& volume, Visit&& visit) {
   for (int k = 0; k < volume.lattice_count(); ++k) {
     const BrickIndex& index = volume.index(k);
     for (const Brick& brick : index.bricks())
-      for (int v = 0; v < kBrickVoxels; ++v)
-        if (brick.local[v] != kNoVoxel)
-          visit(brick.first_slot + brick.local[v],
-                index.frame().voxel_centre(kBrickSide * brick.coord +
-                                           Eigen::Vector3i(v % 8, v / 8 % 8, v / 64)));
+      brick.for_each_voxel(
+          [&](int v, std::uint32_t slot) { visit(slot, index.frame().voxel_centre(voxel_of(brick, v))); });
   }
 }
 

@@ -83,18 +83,13 @@ std::vector<Source> sources_of(const std::vector<const Volume*>& volumes, const 
   return sources;
 }
 
-Eigen::Vector3i voxel_of(const Brick& brick, int v) {
-  return kBrickSide * brick.coord +
-         Eigen::Vector3i(v % kBrickSide, v / kBrickSide % kBrickSide, v / (kBrickSide * kBrickSide));
-}
-
 Topology union_of(const std::vector<Source>& sources, const LatticeFrame& frame) {
   Topology topology(frame);
   for (const Source& source : sources) {
     const bool on_brick_planes = source.offset.unaryExpr([](int x) { return x % kBrickSide; }).isZero();
     for (const Brick& brick : source.index->bricks()) {
       BrickMask mask;
-      for (int v = 0; v < kBrickVoxels; ++v) mask[v] = brick.local[v] != kNoVoxel;
+      brick.for_each_voxel([&](int v, std::uint32_t) { mask.set(v); });
       if (on_brick_planes)
         topology.insert_brick(brick.coord + source.offset / kBrickSide, mask);
       else
@@ -180,9 +175,7 @@ void copy_voxel(const Volume& from, std::uint32_t s, Volume& to, std::uint32_t t
 
 void fill_brick(const std::vector<Source>& sources, const Brick& brick, const MergeOptions& options,
                 Volume& merged) {
-  for (int v = 0; v < kBrickVoxels; ++v) {
-    if (brick.local[v] == kNoVoxel) continue;
-    const std::uint32_t slot = brick.first_slot + brick.local[v];
+  brick.for_each_voxel([&](int v, std::uint32_t slot) {
     Evidence evidence(options);
     int found = 0;
     for (const Source& source : sources) {
@@ -192,7 +185,7 @@ void fill_brick(const std::vector<Source>& sources, const Brick& brick, const Me
       evidence.add(*source.volume, from);
     }
     if (found > 1) evidence.store(merged, slot);
-  }
+  });
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "roxel/volume/neighbours.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace roxel {
 namespace {
@@ -15,13 +16,14 @@ Span span(int d) {
 
 void copy_part(const Brick& brick, const float* channel, const Eigen::Vector3i& d, float* block) {
   const Span x = span(d.x()), y = span(d.y()), z = span(d.z());
-  const float* values = channel + brick.first_slot;
   for (int k = z.first; k <= z.last; ++k)
     for (int j = y.first; j <= y.last; ++j) {
-      const std::uint16_t* local = brick.local.data() + voxel_in_brick(0, j, k);
+      const int first = voxel_in_brick(x.first, j, k);
+      std::uint32_t left = (brick.word[first / 32] >> first % 32) & ((2u << (x.last - x.first)) - 1);
+      if (left == 0) continue;
+      const float* value = channel + brick.slot(first);  // of the row's first voxel from there on
       float* row = block + voxel_in_block(kBrickSide * d.x(), j + kBrickSide * d.y(), k + kBrickSide * d.z());
-      for (int i = x.first; i <= x.last; ++i)
-        if (local[i] != kNoVoxel) row[i] = values[local[i]];
+      for (; left != 0; left &= left - 1) row[x.first + std::countr_zero(left)] = *value++;
     }
 }
 

@@ -14,12 +14,10 @@ std::vector<BrickMask> kept_masks(const Volume& volume, int lattice, const Refin
   std::vector<BrickMask> masks(bricks.size());
   parallel_for_blocks(bricks.size(), 64, threads, [&](std::int64_t begin, std::int64_t end, int) {
     for (std::int64_t b = begin; b < end; ++b)
-      for (int v = 0; v < kBrickVoxels; ++v) {
-        if (bricks[b].local[v] == kNoVoxel) continue;
-        const std::uint32_t slot = bricks[b].first_slot + bricks[b].local[v];
+      bricks[b].for_each_voxel([&](int v, std::uint32_t slot) {
         masks[b][v] = alpha_from_tau(volume.tau[slot]) >= options.opacity_threshold &&
                       volume.confidence[slot] >= options.confidence_threshold;
-      }
+      });
   });
   return masks;
 }
@@ -44,13 +42,8 @@ class Inheritance {
         prior_tau_(tau_from_alpha(options.prior_opacity)) {}
 
   void fill_brick(int lattice, const std::vector<BrickMask>& kept, const Brick& brick) const {
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (brick.local[v] == kNoVoxel) continue;
-      const Eigen::Vector3i in_brick(v % kBrickSide, v / kBrickSide % kBrickSide,
-                                     v / (kBrickSide * kBrickSide));
-      const Eigen::Vector3i ijk = kBrickSide * brick.coord + in_brick;
-      fill(parent_slot(lattice, kept, ijk), brick.first_slot + brick.local[v]);
-    }
+    brick.for_each_voxel(
+        [&](int v, std::uint32_t slot) { fill(parent_slot(lattice, kept, voxel_of(brick, v)), slot); });
   }
 
  private:
@@ -62,7 +55,7 @@ class Inheritance {
     const std::int32_t b = index.brick_at(x / kBrickSide, y / kBrickSide, z / kBrickSide);
     if (b < 0) return kNoSlot;
     const int v = voxel_in_brick(x % kBrickSide, y % kBrickSide, z % kBrickSide);
-    return kept[b][v] ? index.bricks()[b].first_slot + index.bricks()[b].local[v] : kNoSlot;
+    return kept[b][v] ? index.bricks()[b].slot(v) : kNoSlot;
   }
 
   void fill(std::uint32_t from, std::uint32_t to) const {

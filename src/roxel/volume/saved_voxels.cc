@@ -8,15 +8,11 @@ void for_each_saved_voxel(
   if (volume.lattice_count() == 0) return;
   const BrickIndex& index = volume.index(0);
   for (const Brick& brick : index.bricks())
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (brick.local[v] == kNoVoxel) continue;
-      const std::uint32_t slot = brick.first_slot + brick.local[v];
+    brick.for_each_voxel([&](int v, std::uint32_t slot) {
       const float alpha = alpha_from_tau(volume.tau[slot]);
-      if (!(alpha >= opacity_threshold && volume.confidence[slot] >= confidence_threshold)) continue;
-      const Eigen::Vector3i in_brick(v % kBrickSide, v / kBrickSide % kBrickSide,
-                                     v / (kBrickSide * kBrickSide));
-      visit(slot, index.frame().voxel_centre(kBrickSide * brick.coord + in_brick), alpha);
-    }
+      if (alpha >= opacity_threshold && volume.confidence[slot] >= confidence_threshold)
+        visit(slot, index.frame().voxel_centre(voxel_of(brick, v)), alpha);
+    });
 }
 
 }  // namespace roxel

@@ -19,9 +19,8 @@ void for_each_voxel(const BrickIndex& index, const Channel& channel, int brick_i
   float block[kBlockVoxels];
   gather_block(index, channel.data(), brick_idx, 0.0f, block);
   const Brick& brick = index.bricks()[brick_idx];
-  for (int v = 0; v < kBrickVoxels; ++v)
-    if (brick.local[v] != kNoVoxel)
-      visit(brick.first_slot + brick.local[v], block + voxel_in_block(v % 8, v / 8 % 8, v / 64));
+  brick.for_each_voxel(
+      [&](int v, std::uint32_t slot) { visit(slot, block + voxel_in_block(v % 8, v / 8 % 8, v / 64)); });
 }
 
 template <class Visit>
@@ -90,7 +89,7 @@ std::vector<Eigen::Vector3f> surface_axes(const Volume& volume, int threads) {
   std::vector<Eigen::Vector3f> axes(volume.box_slot_count(), Eigen::Vector3f::Zero());
   for_each_brick(index, threads, [&](int b) {
     const Brick& brick = index.bricks()[b];
-    for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count; ++slot)
+    for (std::uint32_t slot = brick.first_slot; slot < brick.first_slot + brick.count(); ++slot)
       axes[slot] = first_axis(tensor, slot);
   });
   return axes;

@@ -1,7 +1,6 @@
 #include "roxel/volume/volume.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <sstream>
 
@@ -62,21 +61,13 @@ BrickIndex::BrickIndex(const Topology& topology, std::uint32_t first_slot)
     Brick& brick = bricks_.emplace_back();
     brick.coord = coord;
     brick.first_slot = first_slot_ + slot_count_;
-    brick.local.fill(kNoVoxel);
-    std::uint16_t local = 0;
-    BrickBits& bits = bits_.emplace_back();
-    bits.word.fill(0);
-    bits.coord = {brick.coord.x(), brick.coord.y(), brick.coord.z()};
-    bits.first_slot = brick.first_slot;
-    for (auto v = mask._Find_first(); v < mask.size(); v = mask._Find_next(v)) {
-      brick.local[v] = local++;
-      bits.word[v / 32] |= std::uint32_t{1} << v % 32;
-    }
-    bits.before[0] = 0;
-    for (std::size_t w = 1; w < bits.word.size(); ++w)
-      bits.before[w] = static_cast<std::uint16_t>(bits.before[w - 1] + std::popcount(bits.word[w - 1]));
-    brick.count = local;
-    slot_count_ += local;
+    brick.word.fill(0);
+    for (auto v = mask._Find_first(); v < mask.size(); v = mask._Find_next(v))
+      brick.word[v / 32] |= std::uint32_t{1} << v % 32;
+    brick.before[0] = 0;
+    for (std::size_t w = 1; w < brick.word.size(); ++w)
+      brick.before[w] = static_cast<std::uint16_t>(brick.before[w - 1] + std::popcount(brick.word[w - 1]));
+    slot_count_ += brick.count();
   });
 }
 
@@ -85,9 +76,8 @@ std::uint32_t BrickIndex::slot(const Eigen::Vector3i& ijk) const {
   const std::int32_t brick_idx = brick_at(ijk.x() / kBrickSide, ijk.y() / kBrickSide, ijk.z() / kBrickSide);
   if (brick_idx < 0) return kNoSlot;
   const Brick& brick = bricks_[brick_idx];
-  const std::uint16_t local =
-      brick.local[voxel_in_brick(ijk.x() % kBrickSide, ijk.y() % kBrickSide, ijk.z() % kBrickSide)];
-  return local == kNoVoxel ? kNoSlot : brick.first_slot + local;
+  const int v = voxel_in_brick(ijk.x() % kBrickSide, ijk.y() % kBrickSide, ijk.z() % kBrickSide);
+  return brick.has(v) ? brick.slot(v) : kNoSlot;
 }
 
 std::vector<LatticeFrame> nested_frames(const Eigen::AlignedBox3d& bounds, double voxel_size,

@@ -19,6 +19,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <bit>
 #include <bitset>
 #include <cstdint>
 #include <functional>
@@ -33,7 +34,6 @@ inline constexpr int kBrickVoxels = kBrickSide * kBrickSide * kBrickSide;
 /// mistake.
 inline constexpr double kMaxBricks = 1 << 28;
 inline constexpr std::uint32_t kNoSlot = 0xffffffffu;
-inline constexpr std::uint16_t kNoVoxel = 0xffffu;
 
 /// Index of a voxel within its brick: x fastest; i, j, k in [0, 8).
 inline int voxel_in_brick(int i, int j, int k) { return i + kBrickSide * (j + kBrickSide * k); }
@@ -89,25 +89,42 @@ class Topology {
   std::unique_ptr<Tree> tree_;
 };
 
-/// One brick of the compiled index. `local[v]` is kNoVoxel, or the voxel's slot minus first_slot.
-struct Brick {
-  Eigen::Vector3i coord;  ///< in bricks
-  std::uint32_t first_slot;
-  std::uint32_t count;
-  std::array<std::uint16_t, kBrickVoxels> local;
-};
-
-/// The same brick in little memory: voxel v exists where bit v % 32 of word[v / 32] is set, and its slot is
-/// that of the brick plus before[v / 32] plus the bits set below it.
-struct alignas(64) BrickBits {
+/// One brick of the compiled index: voxel v exists where bit v % 32 of word[v / 32] is set, and its slot is
+/// first_slot plus before[v / 32] plus the bits set below it.
+struct alignas(64) Brick {
   std::array<std::uint32_t, kBrickVoxels / 32> word;
   std::array<std::uint16_t, kBrickVoxels / 32> before;
-  std::array<std::int32_t, 3> coord;  ///< as the brick's, beside what is read next
+  Eigen::Vector3i coord;  ///< in bricks
   std::uint32_t first_slot;
-};
-static_assert(sizeof(BrickBits) == 128);
 
-/// A topology compiled for the march: two array reads from a voxel to its slot.
+  bool has(int v) const { return (word[v / 32] >> v % 32 & 1) != 0; }
+  /// The slot of a voxel that exists.
+  std::uint32_t slot(int v) const {
+    const std::uint32_t below = word[v / 32] & ((std::uint32_t{1} << v % 32) - 1);
+    return first_slot + before[v / 32] + static_cast<std::uint32_t>(std::popcount(below));
+  }
+  /// Of voxels that exist.
+  std::uint32_t count() const {
+    return before.back() + static_cast<std::uint32_t>(std::popcount(word.back()));
+  }
+  /// Calls visit(v, slot) for each voxel that exists, x fastest.
+  template <class Visit>
+  void for_each_voxel(Visit&& visit) const {
+    std::uint32_t slot = first_slot;
+    for (int w = 0; w < static_cast<int>(word.size()); ++w)
+      for (std::uint32_t left = word[w]; left != 0; left &= left - 1)
+        visit(32 * w + std::countr_zero(left), slot++);
+  }
+};
+static_assert(sizeof(Brick) == 128);
+
+/// Index within the lattice of voxel v of a brick.
+inline Eigen::Vector3i voxel_of(const Brick& brick, int v) {
+  return kBrickSide * brick.coord +
+         Eigen::Vector3i(v % kBrickSide, v / kBrickSide % kBrickSide, v / (kBrickSide * kBrickSide));
+}
+
+/// A topology compiled for the march: from a voxel to its slot.
 class BrickIndex {
  public:
   BrickIndex() = default;
@@ -118,8 +135,6 @@ class BrickIndex {
   std::uint32_t first_slot() const { return first_slot_; }
   std::uint32_t slot_count() const { return slot_count_; }
   const std::vector<Brick>& bricks() const { return bricks_; }
-  /// Of each of bricks().
-  const std::vector<BrickBits>& bits() const { return bits_; }
   /// Index into bricks(), or -1; (bx, by, bz) must be inside the frame.
   std::int32_t brick_at(int bx, int by, int bz) const {
     return table_[bx + static_cast<std::size_t>(frame_.size_in_bricks.x()) *
@@ -135,7 +150,6 @@ class BrickIndex {
   std::uint32_t slot_count_ = 0;
   std::vector<std::int32_t> table_;
   std::vector<Brick> bricks_;
-  std::vector<BrickBits> bits_;
 };
 
 /// The frames of a volume: the box's lattice and `surround_count` lattices around it. The box is `bounds`

@@ -52,11 +52,11 @@ TEST(BrickIndex, BricksCountTheirVoxels) {
   topology.insert({8, 0, 0});
   const BrickIndex index(topology, 5);
   ASSERT_EQ(index.bricks().size(), 2u);
-  EXPECT_EQ(index.bricks()[0].count, 1u);
-  EXPECT_EQ(index.bricks()[1].count, 2u);
+  EXPECT_EQ(index.bricks()[0].count(), 1u);
+  EXPECT_EQ(index.bricks()[1].count(), 2u);
   EXPECT_EQ(index.bricks()[1].first_slot, 6u);
   EXPECT_EQ(index.brick_at(1, 0, 0), 1);
-  EXPECT_EQ(index.bricks()[1].local[voxel_in_brick(7, 7, 7)], 1);
+  EXPECT_EQ(index.bricks()[1].slot(voxel_in_brick(7, 7, 7)), 7u);
 }
 
 TEST(LatticeFrame, VoxelCentresAreHalfAVoxelInside) {
