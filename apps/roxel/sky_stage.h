@@ -13,8 +13,9 @@ std::vector<nlohmann::ordered_json> fit_skies(const SkyInput& input, const SkyOp
                                               const std::filesystem::path& run, Session& session,
                                               std::vector<std::string>& warnings);
 
-/// The skies of RUN/sky over the views of a data set, matched by the views' names. Throws InvalidInput where
-/// the run has none, or none for any view.
+/// The skies of RUN/sky over the views of a data set, matched by the views' names; views that it has none of
+/// share their node's. Throws InvalidInput where the run has none, or none for any view, or views of those
+/// names stand elsewhere.
 Daylight read_daylight(const std::filesystem::path& run, const Dataset& dataset);
 
 /// The loader, with what RUN/sky/mask calls sky as background besides what a mask of its own does; views

@@ -63,7 +63,7 @@ CHANGES = {
     "white-point": ([], ["--white-point", "A"]),
 }
 # Options that change files or what is said, and not the numbers; the tests of Switches and Depth are theirs.
-ELSEWHERE = set(DEPTH_CHANGES) | {"checkpoints", "checkpoint-interval", "resume", "memory", "export", "depth", "dry-run", "init", "json", "quiet", "render", "report", "save-surround", "sky", "sky-again", "sky-light", "sky-masks", "sun", "threads", "verbose"}
+ELSEWHERE = set(DEPTH_CHANGES) | {"checkpoints", "checkpoint-interval", "resume", "memory", "export", "depth", "dry-run", "empty-sky", "init", "json", "quiet", "render", "report", "save-surround", "sky", "sky-again", "sky-light", "sky-masks", "sun", "threads", "verbose"}
 # Those of the surface, in mesh_test.py.
 MESH = {"colors", "faces", "hole-size", "level-seams", "mesh", "mesh-band", "mesh-error", "mesh-pictures", "mesh-smooth",
         "mesh-voxel-size", "min-views", "seam-cost", "smallest-part", "texture", "texture-size", "transient"}

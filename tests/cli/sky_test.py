@@ -585,6 +585,22 @@ class LightInReconstruct(SkyCase):
         self.assertTrue(apart)
         for warning in apart: self.assertEqual(said.count(warning), 1)
 
+    def test_what_photographs_show_as_sky_alone_is_emptied_unless_told_otherwise(self):
+        found = {}
+        for name, option in (("emptied", []), ("left", ["--no-empty-sky"]), ("unknown", ["--background", "unknown"])):
+            out, summary = self.reconstruct(name, "--sky", self.skies, "--opacity-threshold", "0.0001", *option)
+            found[name] = digest(out / "voxels.ply"), any("sky alone were emptied" in note for note in summary["notes"])
+        self.assertEqual([emptied for _, emptied in found.values()], [True, False, False])
+        self.assertNotEqual(found["emptied"][0], found["left"][0])
+
+    def test_skies_of_other_photographs_of_the_same_names_are_refused(self):
+        data = json.loads((self.street / "transforms.json").read_text())
+        frame = next(f for f in data["frames"] if "n01_03" in f["file_path"])
+        frame["transform_matrix"][0][3] += 5
+        elsewhere = self.street / "elsewhere.json"
+        elsewhere.write_text(json.dumps(data))
+        self.expect_error(2, "n01.json: centres: found n01_03 at ", "reconstruct", elsewhere, "-o", self.folder / "no", *SMALL, "--sky", self.skies)
+
     def test_the_mean_of_the_dome_is_another_light(self):
         skies = self.skies
         _, horizontal = self.reconstruct("horizontal", "--sky", skies)

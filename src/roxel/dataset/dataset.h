@@ -56,6 +56,7 @@ struct Photograph {
   Image rgb;        ///< linear RGB, 3 channels
   Mask valid;       ///< 0 where undistortion left no data; empty = all valid
   Mask foreground;  ///< 255 object, 0 background; empty where the view has no mask
+  Mask sky = {};    ///< 255 surely sky, 0 surely not; empty where the view's sky is not known
 };
 
 /// Throws InvalidInput when the file is missing, broken or of another size than the camera. Thread safe.

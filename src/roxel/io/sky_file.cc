@@ -22,6 +22,12 @@ constexpr double kDegrees = 180 / std::numbers::pi;
 
 ordered_json triple(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
+ordered_json triples(const std::vector<Eigen::Vector3d>& vectors) {
+  ordered_json out = ordered_json::array();
+  for (const Eigen::Vector3d& v : vectors) out.push_back(triple(v));
+  return out;
+}
+
 ordered_json angles(const Eigen::Vector3d& d) {
   const double azimuth = std::atan2(d.x(), d.y()) * kDegrees;
   return {{"azimuth_deg", azimuth < 0 ? azimuth + 360 : azimuth},
@@ -91,7 +97,8 @@ ordered_json to_json(const NodeSky& sky) {
           {"horizontal_irradiance", triple(light.horizontal_irradiance(Disc::kWith))},
           {"horizontal_irradiance_without_disc", triple(light.horizontal_irradiance(Disc::kWithout))},
           {"mean_radiance", triple(light.mean_radiance(Disc::kWith))},
-          {"views", sky.views}};
+          {"views", sky.views},
+          {"centres", triples(sky.centres)}};
 }
 
 /// Reads fields of one object; every complaint names the file and the field.
@@ -202,6 +209,19 @@ void read_rotation(const Fields& fields, NodeSky& sky) {
     throw_invalid(where, rows.dump(), "a rotation");
 }
 
+/// None in files of older versions.
+void read_centres(const json& root, const Fields& fields, NodeSky& sky) {
+  if (!root.contains("centres")) return;
+  const json& centres = fields.at("centres");
+  const std::string where = fields.where("centres");
+  if (!centres.is_array() || (!centres.empty() && centres.size() != sky.views.size()))
+    throw_invalid(where, centres.dump(), "one place a view, or none");
+  for (const json& centre : centres) {
+    const json wrapped{{"centre", centre}};
+    sky.centres.push_back(Fields(wrapped, where).vector("centre"));
+  }
+}
+
 NodeSky from_json(const json& root, const std::string& file) {
   const Fields fields(root, file);
   if (fields.text("format") != kSkyFormat)
@@ -230,6 +250,7 @@ NodeSky from_json(const json& root, const std::string& file) {
     if (!view.is_string()) throw_invalid(fields.where("views"), view.dump(), "names of views");
     sky.views.push_back(view.get<std::string>());
   }
+  read_centres(root, fields, sky);
   return sky;
 }
 

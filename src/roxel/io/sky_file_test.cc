@@ -25,6 +25,7 @@ class SkyFile : public ::testing::Test {
     NodeSky s = clear_sky(200, 33.3);
     s.name = "n04";
     s.views = {"a", "b/c"};
+    s.centres = {{1, 2, 1.0 / 3}, {-4, 5, 6e-9}};
     s.time_utc_s = 1061484600.25;
     s.latitude_deg = 42.36;
     s.sky_from_world << 0, 1, 0, -1, 0, 0, 0, 0, 1;
@@ -51,6 +52,7 @@ TEST_F(SkyFile, ReadsWhatItWroteExactly) {
   const NodeSky& after = skies[0];
   EXPECT_EQ(after.name, before.name);
   EXPECT_EQ(after.views, before.views);
+  EXPECT_EQ(after.centres, before.centres);
   EXPECT_EQ(after.time_utc_s, before.time_utc_s);
   EXPECT_EQ(after.latitude_deg, before.latitude_deg);
   EXPECT_EQ(after.longitude_deg, before.longitude_deg);

@@ -43,8 +43,9 @@ const char* to_string(SunLight light);
 enum class Disc { kWithout, kWith };
 
 struct NodeSky {
-  std::string name;                ///< of the files: "n03"
-  std::vector<std::string> views;  ///< whose pixels it was fitted to
+  std::string name;                      ///< of the files: "n03"
+  std::vector<std::string> views;        ///< whose pixels it was fitted to
+  std::vector<Eigen::Vector3d> centres;  ///< of their cameras, world; empty where they are not known
   std::optional<double> time_utc_s, latitude_deg, longitude_deg;
   Eigen::Matrix3d sky_from_world = Eigen::Matrix3d::Identity();  ///< to X east, Y north, Z up
 

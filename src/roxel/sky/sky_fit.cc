@@ -96,6 +96,7 @@ class Fitting {
   void describe() {
     sky().name = task_.name;
     sky().views = task_.views;
+    sky().centres = task_.centres;
     sky().time_utc_s = task_.time_utc_s;
     sky().latitude_deg = task_.latitude_deg;
     sky().longitude_deg = task_.longitude_deg;

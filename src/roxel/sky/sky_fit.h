@@ -26,7 +26,8 @@ struct SkyFitOptions {
 /// One node: what is known of it apart from its pictures.
 struct SkyTask {
   std::string name;
-  std::vector<std::string> views;  ///< one a picture
+  std::vector<std::string> views;        ///< one a picture
+  std::vector<Eigen::Vector3d> centres;  ///< of their cameras, world; may be empty
   std::optional<double> time_utc_s, latitude_deg, longitude_deg;
   Eigen::Matrix3d sky_from_world = Eigen::Matrix3d::Identity();
 };

@@ -245,7 +245,10 @@ DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<do
   for (Group& group : groups) {
     SkyTask task;
     task.name = node_name(group.id ? *group.id : next++);
-    for (const int v : group.views) task.views.push_back(dataset.views[v].name);
+    for (const int v : group.views) {
+      task.views.push_back(dataset.views[v].name);
+      task.centres.push_back(dataset.views[v].camera.pose.centre);
+    }
     task.time_utc_s = first_value(dataset, group.views, &View::time_utc_s);
     task.latitude_deg = first_value(dataset, group.views, &View::latitude_deg);
     task.longitude_deg = first_value(dataset, group.views, &View::longitude_deg);

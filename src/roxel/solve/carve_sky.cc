@@ -3,27 +3,26 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "roxel/base/parallel.h"
 
 namespace roxel {
 namespace {
 
-constexpr std::uint8_t kSurelySky = 5;  ///< of 255: the most that is still foreground
+constexpr std::uint8_t kSurelySky = 250;  ///< of 255, at least
 constexpr double kMarginPixels = 0.5;
 
 /// How many pixels of any rectangle are surely sky: sums over all pixels above and to the left.
 class SkyCount {
  public:
   explicit SkyCount(const Photograph& photo)
-      : width_(photo.foreground.width()),
-        height_(photo.foreground.height()),
-        sums_((width_ + 1) * (height_ + 1), 0) {
+      : width_(photo.sky.width()), height_(photo.sky.height()), sums_((width_ + 1) * (height_ + 1), 0) {
     for (std::int64_t y = 0; y < height_; ++y)
       for (std::int64_t x = 0; x < width_; ++x) {
         const std::int64_t i = y * width_ + x;
         const bool seen = photo.valid.empty() || photo.valid.data()[i] == 255;  // not beyond the lens
-        const bool sky = seen && photo.foreground.data()[i] <= kSurelySky;
+        const bool sky = seen && photo.sky.data()[i] >= kSurelySky;
         at(x + 1, y + 1) = at(x, y + 1) + at(x + 1, y) - at(x, y) + sky;
       }
   }
@@ -74,9 +73,25 @@ struct SkyView {
   }
 };
 
-/// Marks the brick's voxels that are before the sky alone.
-void mark(const BrickIndex& index, const Brick& brick, const SkyView& view,
-          std::vector<std::uint8_t>& before_sky) {
+/// Who has seen the sky alone behind a voxel: whether two have.
+class Witnesses {
+ public:
+  explicit Witnesses(std::size_t slots) : first_(slots, kNone), two_(slots, 0) {}
+  bool have_said(std::uint32_t slot) const { return two_[slot] != 0; }
+  void add(std::uint32_t slot, std::int32_t witness) {
+    if (first_[slot] == kNone) first_[slot] = witness;
+    two_[slot] = first_[slot] != witness;
+  }
+
+ private:
+  static constexpr std::int32_t kNone = -1;
+  std::vector<std::int32_t> first_;
+  std::vector<std::uint8_t> two_;
+};
+
+/// Notes which of the brick's voxels are before the sky alone.
+void look(const BrickIndex& index, const Brick& brick, const SkyView& view, std::int32_t witness,
+          Witnesses& witnesses) {
   const LatticeFrame& frame = index.frame();
   const double size = frame.voxel_size;
   const Eigen::Vector3i first = kBrickSide * brick.coord;
@@ -85,9 +100,27 @@ void mark(const BrickIndex& index, const Brick& brick, const SkyView& view,
       (frame.voxel_centre(first) + frame.voxel_centre(first + Eigen::Vector3i::Constant(kBrickSide - 1)));
   if (view.before(middle, kBrickSide * size) == SkyCount::Share::kNone) return;
   brick.for_each_voxel([&](int v, std::uint32_t slot) {
-    const Eigen::Vector3d centre = frame.voxel_centre(voxel_of(brick, v));
-    if (!before_sky[slot] && view.before(centre, size) == SkyCount::Share::kAll) before_sky[slot] = 1;
+    if (witnesses.have_said(slot)) return;
+    if (view.before(frame.voxel_centre(voxel_of(brick, v)), size) == SkyCount::Share::kAll)
+      witnesses.add(slot, witness);
   });
+}
+
+/// One a view: its node, or where no other node has masks, the view itself.
+std::vector<std::int32_t> witnesses_of(const Dataset& dataset, const std::vector<std::uint8_t>& sky_masked) {
+  std::vector<std::int32_t> of_views(dataset.views.size());
+  std::iota(of_views.begin(), of_views.end(), 0);
+  std::vector<std::int32_t> nodes = of_views;
+  int masked_nodes = 0;
+  for (std::size_t n = 0; n < dataset.nodes.size(); ++n) {
+    bool any = false;
+    for (const int v : dataset.nodes[n].view_idxs) {
+      nodes[v] = static_cast<std::int32_t>(n);
+      any |= v < std::ssize(sky_masked) && sky_masked[v] != 0;
+    }
+    masked_nodes += any;
+  }
+  return masked_nodes > 1 ? nodes : of_views;
 }
 
 }  // namespace
@@ -96,25 +129,26 @@ std::int64_t carve_sky(const Dataset& dataset, const PhotographLoader& load,
                        const std::vector<std::uint8_t>& sky_masked, UpdateRule rule,
                        const RunContext& context, Volume& volume) {
   constexpr std::int64_t kGrain = 64;
-  std::vector<std::uint8_t> before_sky(volume.slot_count(), 0);
+  Witnesses witnesses(volume.slot_count());
+  const std::vector<std::int32_t> witness = witnesses_of(dataset, sky_masked);
   for (std::size_t v = 0; v < sky_masked.size(); ++v) {
     context.throw_if_cancelled();
     if (!sky_masked[v]) continue;
     const Photograph photo = load(dataset.views[v]);
-    if (photo.foreground.empty()) continue;
+    if (photo.sky.empty()) continue;
     const SkyView view{dataset.views[v].camera, SkyCount(photo)};
     for (int lattice = 0; lattice < volume.lattice_count(); ++lattice) {
       const BrickIndex& index = volume.index(lattice);
       parallel_for_blocks(std::ssize(index.bricks()), kGrain, context.thread_count(),
                           [&](std::int64_t begin, std::int64_t end, int) {
                             for (std::int64_t b = begin; b < end; ++b)
-                              mark(index, index.bricks()[b], view, before_sky);
+                              look(index, index.bricks()[b], view, witness[v], witnesses);
                           });
     }
   }
   std::int64_t carved = 0;
   for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot) {
-    if (!before_sky[slot]) continue;
+    if (!witnesses.have_said(slot)) continue;
     carved += volume.tau[slot] > 0;
     volume.tau[slot] = 0;
     std::array<float, 2>& support = volume.support[slot];

@@ -9,6 +9,9 @@ namespace {
 
 constexpr int kSide = 100;  ///< pixels
 
+/// Masks of both views of one node.
+const std::vector<std::uint8_t> kFirst = {1, 1, 0, 0}, kSecond = {0, 0, 1, 1};
+
 /// Full lattice of 24^3 voxels of side 0.1 about the origin.
 Volume full_volume() {
   Topology topology(
@@ -25,16 +28,20 @@ Volume full_volume() {
   return volume;
 }
 
-/// Cameras 4 in front of the volume (along z), side by side, 50 degrees wide.
-Dataset two_cameras() {
+/// Two cameras each at two places 4 in front of the volume (along z), 50 degrees wide: views 0 and 1 are the
+/// first node's, 2 and 3, 0.4 beside them, the second's.
+Dataset four_cameras() {
   Dataset dataset;
-  for (int v = 0; v < 2; ++v) {
+  for (int v = 0; v < 4; ++v) {
     View view;
     view.name = std::to_string(v);
     view.camera.intrinsics = {kSide, kSide, 100, 100, 50, 50, 0};
-    view.camera.pose.centre = {0.4 * v, 0, -4};
+    view.camera.pose.centre = {v < 2 ? 0.0 : 0.4, 0, -4};
     dataset.views.push_back(view);
   }
+  dataset.nodes.resize(2);
+  dataset.nodes[0].view_idxs = {0, 1};
+  dataset.nodes[1].view_idxs = {2, 3};
   return dataset;
 }
 
@@ -43,9 +50,10 @@ Photograph sky_above(int horizon) {
   Photograph photo;
   photo.rgb = Image(kSide, kSide, 3);
   photo.foreground = Mask(kSide, kSide);
+  photo.sky = Mask(kSide, kSide, 0);
   for (int y = 0; y < horizon; ++y)
-    for (int x = 0; x < kSide; ++x) photo.foreground.at(x, y) = 3;
-  photo.foreground.at(70, 10) = 200;
+    for (int x = 0; x < kSide; ++x) photo.sky.at(x, y) = 252;
+  photo.sky.at(70, 10) = 55;
   return photo;
 }
 
@@ -56,10 +64,10 @@ float tau_at(const Volume& volume, const Eigen::Vector3d& at) {
       .tau[index.slot(((at - frame.origin) / frame.voxel_size).array().floor().cast<int>().matrix())];
 }
 
-/// The volume after one camera's photograph has carved it.
+/// The volume after photographs have carved it.
 Volume carved(int horizon, const std::vector<std::uint8_t>& sky_masked, int threads = 1,
               UpdateRule rule = UpdateRule::kPosterior) {
-  const Dataset dataset = two_cameras();
+  const Dataset dataset = four_cameras();
   Volume volume = full_volume();
   carve_sky(
       dataset, [&](const View&) { return sky_above(horizon); }, sky_masked, rule, RunContext(threads),
@@ -68,7 +76,7 @@ Volume carved(int horizon, const std::vector<std::uint8_t>& sky_masked, int thre
 }
 
 TEST(CarveSky, EmptiesWhatAPhotographShowsAsSkyAlone) {
-  const Volume volume = carved(50, {1, 0});  // above the optical axis: y < 0
+  const Volume volume = carved(50, kFirst);  // above the optical axis: y < 0
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 0.05}), 0);
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 1.05}), 0);  // behind it, too
   EXPECT_EQ(tau_at(volume, {0.05, 0.75, 0.05}), 0.5f);
@@ -80,14 +88,14 @@ TEST(CarveSky, EmptiesWhatAPhotographShowsAsSkyAlone) {
 }
 
 TEST(CarveSky, LeavesWhatIsPartlyOutsideTheImage) {
-  const Volume volume = carved(kSide, {1, 0});
+  const Volume volume = carved(kSide, kFirst);
   EXPECT_EQ(tau_at(volume, {0.05, 0.05, -1.15}), 0);
   EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.15}), 0);  // row 10
   EXPECT_EQ(tau_at(full_volume(), {0.05, 0.05, 0}), 0.5f);
-  const Dataset dataset = two_cameras();
+  const Dataset dataset = four_cameras();
   for (const double x : {-1.15, 1.15}) {
     // Column 50 + 100 x / z: at -1.15 of the second camera that is 50 - 155 / 2.85, outside.
-    const Volume by_second = carved(kSide, {0, 1});
+    const Volume by_second = carved(kSide, kSecond);
     EXPECT_EQ(tau_at(by_second, {x, 0.05, -1.15}), x < 0 ? 0.5f : 0.0f);
   }
 }
@@ -100,36 +108,57 @@ TEST(CarveSky, LeavesWhatTheLensDoesNotReach) {
     return photo;
   };
   Volume volume = full_volume();
-  carve_sky(two_cameras(), load, {1, 0}, UpdateRule::kPosterior, RunContext(1), volume);
+  carve_sky(four_cameras(), load, kFirst, UpdateRule::kPosterior, RunContext(1), volume);
   EXPECT_EQ(tau_at(volume, {0.05, -1.15, 0.05}), 0.5f);  // rows 20 to 24
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 0.05}), 0);
 }
 
-TEST(CarveSky, AsksOnlyViewsWhoseMaskIsOfTheSky) {
-  EXPECT_EQ(tau_at(carved(50, {0, 0}), {0.05, -0.75, 0.05}), 0.5f);
-  EXPECT_EQ(tau_at(carved(50, {0, 1}), {0.05, -0.75, 0.05}), 0);
-  EXPECT_EQ(tau_at(carved(50, {}), {0.05, -0.75, 0.05}), 0.5f);
+TEST(CarveSky, TakesTwoNodesWhereTwoKnowTheirSky) {
+  const Eigen::Vector3d above(0.05, -0.75, 0.05);
+  EXPECT_EQ(tau_at(carved(50, {0, 0, 0, 0}), above), 0.5f);
+  EXPECT_EQ(tau_at(carved(50, {}), above), 0.5f);
+  EXPECT_EQ(tau_at(carved(50, {1, 0, 0, 0}), above), 0.5f) << "one photograph";
+  EXPECT_EQ(tau_at(carved(50, {0, 0, 1, 1}), above), 0) << "two of the only node";
+  EXPECT_EQ(tau_at(carved(50, {1, 0, 1, 0}), above), 0) << "one of each node";
+  // The second node's photographs show no sky: the first's two are one witness.
+  Volume volume = full_volume();
+  const PhotographLoader load = [](const View& view) { return sky_above(view.name < "2" ? 50 : 0); };
+  carve_sky(four_cameras(), load, {1, 1, 1, 1}, UpdateRule::kPosterior, RunContext(1), volume);
+  EXPECT_EQ(tau_at(volume, above), 0.5f);
+}
+
+TEST(CarveSky, AsksMasksOfTheSkyAlone) {
+  const auto load = [](const View&) {
+    Photograph photo = sky_above(50);
+    photo.foreground = Mask(kSide, kSide, 0);  // no object anywhere
+    return photo;
+  };
+  Volume volume = full_volume();
+  carve_sky(four_cameras(), load, kFirst, UpdateRule::kPosterior, RunContext(1), volume);
+  EXPECT_EQ(volume.tau, carved(50, kFirst).tau);
 }
 
 TEST(CarveSky, CountsAndLeavesNoHits) {
-  const Dataset dataset = two_cameras();
+  const Dataset dataset = four_cameras();
   Volume volume = full_volume();
   const PhotographLoader load = [](const View&) { return sky_above(50); };
-  const std::int64_t count = carve_sky(dataset, load, {1, 0}, UpdateRule::kPosterior, RunContext(1), volume);
+  const std::int64_t count = carve_sky(dataset, load, kFirst, UpdateRule::kPosterior, RunContext(1), volume);
   EXPECT_EQ(count, std::count(volume.tau.begin(), volume.tau.end(), 0.0f));
   EXPECT_GT(count, 24 * 24 * 24 / 4);
   for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot)
     EXPECT_EQ(volume.support[slot],
               (volume.tau[slot] > 0 ? std::array<float, 2>{3, 6} : std::array<float, 2>{0, 6}));
-  EXPECT_EQ(carve_sky(dataset, load, {1, 0}, UpdateRule::kPosterior, RunContext(1), volume), 0);
-  const Volume roxels = carved(50, {1, 0}, 1, UpdateRule::kRoxels);
+  EXPECT_EQ(carve_sky(dataset, load, kFirst, UpdateRule::kPosterior, RunContext(1), volume), 0);
+  const Volume roxels = carved(50, kFirst, 1, UpdateRule::kRoxels);
   for (std::uint32_t slot = 0; slot < roxels.slot_count(); ++slot) {
     if (roxels.tau[slot] > 0) continue;
     EXPECT_EQ(roxels.support[slot], (std::array<float, 2>{3, 0}));
   }
 }
 
-TEST(CarveSky, ThreadsDoNotMatter) { EXPECT_EQ(carved(50, {1, 1}, 1).tau, carved(50, {1, 1}, 4).tau); }
+TEST(CarveSky, ThreadsDoNotMatter) {
+  EXPECT_EQ(carved(50, {1, 1, 1, 1}, 1).tau, carved(50, {1, 1, 1, 1}, 4).tau);
+}
 
 }  // namespace
 }  // namespace roxel

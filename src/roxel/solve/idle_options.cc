@@ -37,6 +37,8 @@ constexpr IdleRule kIdleRules[] = {
      "colours are compared with the light of their neighbourhood; see --matching local"},
     {"sky-light", [](const Chosen&, const Scene& s) { return s.light.from != LightSource::kSky; },
      "no sky's light is divided out; see --illumination"},
+    {"empty-sky", [](const Chosen&, const Scene& s) { return s.background.kind != BackgroundKind::kMask; },
+     "the background is not what masks of skies leave; see --background sky"},
     {"coarse-passes", [](const Chosen& o, const Scene&) { return o.levels == 1; },
      "there is but one level; see --levels"},
     {"outline-weight",

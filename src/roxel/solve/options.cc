@@ -235,6 +235,11 @@ void add_background(OptionTable<Options>& table) {
   table.add("filter-rays", &Options::filter_rays)
       .help("Remove what a voxel explains from the sample behind it")
       .source("[Jethwa04] appendix B, -fc");
+  table.add("empty-sky", &Options::empty_sky)
+      .help(
+          "Where masks of skies are the background: after each level, empty the voxels that photographs of "
+          "two nodes show as sky and nothing but sky")
+      .source("[Kutulakos00]; docs/light.md");
   table.add("filter-background", &Options::filter_background)
       .help("Remove a known background's share from samples")
       .source("[Jethwa04] appendix B, -fbg");

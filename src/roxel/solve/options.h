@@ -58,6 +58,7 @@ struct ReconstructOptions {
   std::optional<std::array<double, 3>> background_color;  ///< linear RGB
   bool filter_rays = false;
   bool filter_background = false;
+  bool empty_sky = true;
 
   // Light
   IlluminationChoice illumination = IlluminationChoice::kAuto;

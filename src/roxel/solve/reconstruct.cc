@@ -409,7 +409,9 @@ class Levels {
     Scene& scene = made_.scene;
     const LevelSamples samples(load_, small_photographs_, options_, context_,
                                std::ldexp(scene.voxel_size, options_.levels - state.level));
-    if (daylight_ && daylight_->has_masks()) empty_the_sky(state.level);
+    if (options_.empty_sky && daylight_ && daylight_->has_masks() &&
+        scene.background.kind == BackgroundKind::kMask)
+      empty_the_sky(state.level);
     if (state.level == options_.levels) {
       if (scene.light.by_normal) {
         made_.surface_light = samples.paint_by_normal(scene, *daylight_, made_.volume);
@@ -437,7 +439,7 @@ class Levels {
         carve_sky(dataset_, load_, daylight_->sky_masked, options_.update, context_, made_.volume);
     if (level == options_.levels && emptied > 0)
       made_.summary.notes.push_back(std::to_string(emptied) +
-                                    " voxels that a photograph shows as sky alone were emptied at the end");
+                                    " voxels that photographs show as sky alone were emptied at the end");
   }
 
   void fit_to_photographs() {

@@ -14,7 +14,7 @@ constexpr std::int64_t kPaintGrain = 1024;
 constexpr int kBounces = 2;
 constexpr float kWhitest = 0.95f;  ///< albedo that light is given back with, at most
 
-/// What one node shows of a voxel.
+/// What a node shows of a voxel in one light.
 struct Sighting {
   int sky;
   float weight;
@@ -36,10 +36,30 @@ struct Sightings {
   }
 };
 
-int sky_of_node(const Dataset& dataset, const Daylight& daylight, std::size_t node) {
-  for (const int view : dataset.nodes[node].view_idxs)
-    if (daylight.of_view(view)) return daylight.sky_of_views[view];
-  return -1;
+/// The views of a node that were taken in one light.
+struct LitNode {
+  int node, sky;  ///< sky: -1 where none is known
+};
+
+/// Nodes once more, those whose views have several skies in parts: what each is stands in `lit`.
+std::vector<SampleNode> parts_of_one_light(const Dataset& dataset, const Daylight& daylight,
+                                           const std::vector<SampleNode>& nodes, std::vector<LitNode>& lit) {
+  std::vector<SampleNode> parts;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    const std::size_t first = parts.size();
+    for (std::size_t i = 0; i < nodes[n].size(); ++i) {
+      const int view = dataset.nodes[n].view_idxs[i];
+      const int sky = daylight.of_view(view) ? daylight.sky_of_views[view] : -1;
+      std::size_t part = first;
+      while (part < parts.size() && lit[part].sky != sky) ++part;
+      if (part == parts.size()) {
+        parts.emplace_back();
+        lit.push_back({static_cast<int>(n), sky});
+      }
+      parts[part].push_back(nodes[n][i]);
+    }
+  }
+  return parts;
 }
 
 /// Calls visit(slot, centre) for all voxels.
@@ -56,13 +76,15 @@ void for_each_voxel(const Volume& volume, Visit&& visit) {
 Sightings collect(const Dataset& dataset, const Daylight& daylight, const std::vector<SampleNode>& nodes,
                   const PassOptions& pass, const LatticeStack& stack, const RunContext& context) {
   const Volume& volume = stack.volume();
-  CollectedColors colors(volume.slot_count(), nodes.size(), std::numeric_limits<std::int64_t>::max());
+  std::vector<LitNode> lit;
+  const std::vector<SampleNode> parts = parts_of_one_light(dataset, daylight, nodes, lit);
+  CollectedColors colors(volume.slot_count(), parts.size(), std::numeric_limits<std::int64_t>::max());
   PassOptions keeping = pass;
   keeping.predictive = true;  // each node's own are what is wanted
-  collect_color(stack, nodes, keeping, context, nullptr, colors);
+  collect_color(stack, parts, keeping, context, nullptr, colors);
   Sightings found;
   found.first.assign(volume.slot_count() + 1, 0);
-  for (std::size_t n = 0; n < nodes.size(); ++n)
+  for (std::size_t n = 0; n < parts.size(); ++n)
     for (const OwnColors::Entry& entry : colors.kept.of(n)->entries) ++found.first[entry.slot + 1];
   for (std::size_t slot = 0; slot < volume.slot_count(); ++slot) found.first[slot + 1] += found.first[slot];
   found.all.resize(found.first.back());
@@ -71,14 +93,13 @@ Sightings collect(const Dataset& dataset, const Daylight& daylight, const std::v
   for_each_voxel(volume,
                  [&](std::uint32_t slot, const Eigen::Vector3d& x) { centres[slot] = x.cast<float>(); });
   std::vector<std::uint32_t> next(found.first.begin(), found.first.end() - 1);
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    const int sky = sky_of_node(dataset, daylight, n);
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    const Eigen::Vector3f centre = dataset.nodes[lit[n].node].centre.cast<float>();
     for (const OwnColors::Entry& entry : colors.kept.of(n)->entries) {
       Sighting& seen = found.all[next[entry.slot]++];
-      seen = {sky, std::min(1.0f, entry.color.evidence), {}};
+      seen = {lit[n].sky, std::min(1.0f, entry.color.evidence), {}};
       for (int c = 0; c < 3; ++c) seen.seen[c] = entry.color.mean[c] / entry.color.evidence;
-      found.towards[entry.slot] +=
-          seen.weight * (dataset.nodes[n].centre.cast<float>() - centres[entry.slot]).normalized();
+      found.towards[entry.slot] += seen.weight * (centre - centres[entry.slot]).normalized();
     }
   }
   return found;
