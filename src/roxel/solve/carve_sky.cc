@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::uint8_t kSurelySky = 250;  ///< of 255, at least
 constexpr double kMarginPixels = 0.5;
+constexpr float kWeak = 0.3f;  ///< opacity below which a voxel is haze rather than surface
 
 /// How many pixels of any rectangle are surely sky: sums over all pixels above and to the left.
 class SkyCount {
@@ -73,11 +74,12 @@ struct SkyView {
   }
 };
 
-/// Who has seen the sky alone behind a voxel: whether two have.
+/// Who has seen the sky alone at a voxel: whether one has, or two.
 class Witnesses {
  public:
   explicit Witnesses(std::size_t slots) : first_(slots, kNone), two_(slots, 0) {}
-  bool have_said(std::uint32_t slot) const { return two_[slot] != 0; }
+  bool are_one(std::uint32_t slot) const { return first_[slot] != kNone; }
+  bool are_two(std::uint32_t slot) const { return two_[slot] != 0; }
   void add(std::uint32_t slot, std::int32_t witness) {
     if (first_[slot] == kNone) first_[slot] = witness;
     two_[slot] = first_[slot] != witness;
@@ -100,7 +102,7 @@ void look(const BrickIndex& index, const Brick& brick, const SkyView& view, std:
       (frame.voxel_centre(first) + frame.voxel_centre(first + Eigen::Vector3i::Constant(kBrickSide - 1)));
   if (view.before(middle, kBrickSide * size) == SkyCount::Share::kNone) return;
   brick.for_each_voxel([&](int v, std::uint32_t slot) {
-    if (witnesses.have_said(slot)) return;
+    if (witnesses.are_two(slot)) return;
     if (view.before(frame.voxel_centre(voxel_of(brick, v)), size) == SkyCount::Share::kAll)
       witnesses.add(slot, witness);
   });
@@ -148,7 +150,8 @@ std::int64_t carve_sky(const Dataset& dataset, const PhotographLoader& load,
   }
   std::int64_t carved = 0;
   for (std::uint32_t slot = 0; slot < volume.slot_count(); ++slot) {
-    if (!witnesses.have_said(slot)) continue;
+    const bool weak = alpha_from_tau(volume.tau[slot]) < kWeak;
+    if (!(weak ? witnesses.are_one(slot) : witnesses.are_two(slot))) continue;
     carved += volume.tau[slot] > 0;
     volume.tau[slot] = 0;
     std::array<float, 2>& support = volume.support[slot];

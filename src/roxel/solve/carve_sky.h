@@ -12,12 +12,12 @@
 
 namespace roxel {
 
-/// Empties every voxel whose whole footprint is sky (Photograph::sky) in photographs of two nodes, or of one
-/// node where no other knows its sky: the rectangle around its eight corners and half a pixel more, within
-/// the image, each pixel valid and sky to at least 98 %. One mask that is wrong thus empties nothing.
-/// `sky_masked`, one a view, 1: it has a mask of the sky; others are not looked at. An emptied voxel has tau
-/// 0 and no hits; colours and confidence stay. Returns how many had any opacity. The same for any number of
-/// threads.
+/// Empties every voxel whose whole footprint is sky (Photograph::sky) in photographs of two nodes, or in two
+/// of one node where no other knows its sky, or, with an opacity below 0.3, in one photograph: the rectangle
+/// around its eight corners and half a pixel more, within the image, each pixel valid and sky to at least 98
+/// %. One mask that is wrong thus empties no surface. `sky_masked`, one a view, 1: it has a mask of the sky;
+/// others are not looked at. An emptied voxel has tau 0 and no hits; colours and confidence stay. Returns how
+/// many had any opacity. The same for any number of threads.
 std::int64_t carve_sky(const Dataset& dataset, const PhotographLoader& load,
                        const std::vector<std::uint8_t>& sky_masked, UpdateRule rule,
                        const RunContext& context, Volume& volume);

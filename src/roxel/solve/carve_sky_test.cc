@@ -127,6 +127,18 @@ TEST(CarveSky, TakesTwoNodesWhereTwoKnowTheirSky) {
   EXPECT_EQ(tau_at(volume, above), 0.5f);
 }
 
+TEST(CarveSky, OneIsEnoughForHaze) {
+  const Eigen::Vector3d above(0.05, -0.75, 0.05);
+  for (const auto& [opacity, emptied] : {std::pair{0.28f, true}, {0.32f, false}}) {
+    Volume volume = full_volume();
+    std::fill(volume.tau.begin(), volume.tau.end(), tau_from_alpha(opacity));
+    carve_sky(
+        four_cameras(), [](const View&) { return sky_above(50); }, {1, 0, 0, 0}, UpdateRule::kPosterior,
+        RunContext(1), volume);
+    EXPECT_EQ(tau_at(volume, above) == 0, emptied) << opacity;
+  }
+}
+
 TEST(CarveSky, AsksMasksOfTheSkyAlone) {
   const auto load = [](const View&) {
     Photograph photo = sky_above(50);

@@ -237,8 +237,8 @@ void add_background(OptionTable<Options>& table) {
       .source("[Jethwa04] appendix B, -fc");
   table.add("empty-sky", &Options::empty_sky)
       .help(
-          "Where masks of skies are the background: after each level, empty the voxels that photographs of "
-          "two nodes show as sky and nothing but sky")
+          "Where masks of skies are the background: after each level, empty what photographs show as sky "
+          "and nothing but sky, those of two nodes where it is opaque")
       .source("[Kutulakos00]; docs/light.md");
   table.add("filter-background", &Options::filter_background)
       .help("Remove a known background's share from samples")
