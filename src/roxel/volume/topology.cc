@@ -189,7 +189,10 @@ Topology& Topology::operator=(Topology&&) noexcept = default;
 Topology::~Topology() = default;
 
 std::int64_t Topology::voxel_count() const {
-  return static_cast<std::int64_t>(tree_->mask.activeVoxelCount());
+  std::int64_t count = 0;
+  for (const Leaf* leaf : std::as_const(*tree_).leaves())
+    count += static_cast<std::int64_t>(leaf->onVoxelCount());
+  return count;
 }
 
 bool Topology::contains(const Eigen::Vector3i& ijk) const { return tree_->mask.isValueOn(to_coord(ijk)); }

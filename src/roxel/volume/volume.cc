@@ -45,9 +45,9 @@ void check_bounds(const Eigen::AlignedBox3d& bounds, double voxel_size) {
 /// Fills all but the brick's first slot.
 void set_voxels(const BrickVoxels& found, Brick& brick) {
   brick.coord = found.brick;
-  brick.word.fill(0);
-  for (auto v = found.mask._Find_first(); v < found.mask.size(); v = found.mask._Find_next(v))
-    brick.word[v / 32] |= std::uint32_t{1} << v % 32;
+  const BrickMask low(0xffffffffu);
+  for (std::size_t w = 0; w < brick.word.size(); ++w)
+    brick.word[w] = static_cast<std::uint32_t>((found.mask >> 32 * w & low).to_ulong());
   brick.before[0] = 0;
   for (std::size_t w = 1; w < brick.word.size(); ++w)
     brick.before[w] = static_cast<std::uint16_t>(brick.before[w - 1] + std::popcount(brick.word[w - 1]));
