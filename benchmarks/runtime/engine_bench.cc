@@ -260,8 +260,8 @@ struct Difference {
   double mean() const { return sum / static_cast<double>(count); }
 };
 
-/// Voxels of little colour differ most: fixed point holds a weight of 0.001 to 3e-5 of itself, and a variance
-/// is the small difference of large moments.
+/// Voxels of little colour differ most: fixed point rounds its weight, and a variance is the small difference
+/// of large moments.
 constexpr double kLargestDifference = 5e-3, kMeanDifference = 1e-5, kLikelihoodDifference = 1e-6;
 
 bool same_pass(Occupancy occupancy, bool predictive) {
