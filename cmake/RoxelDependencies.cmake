@@ -20,3 +20,6 @@ if(ROXEL_BUILD_TESTS)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   include(GoogleTest)
 endif()
+if(ROXEL_BUILD_BENCHMARKS)
+  find_package(benchmark QUIET)  # tools/setup.sh dev; without it there is no engine_bench
+endif()

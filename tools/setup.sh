@@ -3,7 +3,7 @@
 # sudo it installs them; otherwise it prints the one command to run and fails.
 #
 #     tools/setup.sh        what `make test` and `make demo` need
-#     tools/setup.sh dev    and what contributors need besides (format, lint, faster rebuilds)
+#     tools/setup.sh dev    and what contributors need besides (format, lint, faster rebuilds, benchmarks)
 set -eu
 
 build="g++ cmake ninja-build python3
@@ -11,7 +11,7 @@ build="g++ cmake ninja-build python3
   libopenimageio-dev openimageio-tools
   libembree-dev libnova-dev libceres-dev libmeshoptimizer-dev libtinygltf-dev libhwy-dev
   nlohmann-json3-dev libcli11-dev libgtest-dev libgmock-dev librapidcheck-dev libopenvdb-tools"
-dev="clang-format clang-tidy ccache"
+dev="clang-format clang-tidy ccache libbenchmark-dev"
 
 wanted=$build
 if [ "${1:-}" = dev ]; then wanted="$build $dev"; fi

@@ -23,13 +23,15 @@ std::vector<BrickMask> kept_masks(const Volume& volume, int lattice, const Refin
 }
 
 Topology next_topology(const Volume& volume, int lattice, const std::vector<BrickMask>& kept,
-                       const RefineOptions& options) {
+                       const RefineOptions& options, int threads) {
   const BrickIndex& index = volume.index(lattice);
+  std::vector<BrickVoxels> bricks(kept.size());
+  for (std::size_t b = 0; b < kept.size(); ++b) bricks[b] = {index.bricks()[b].coord, kept[b]};
   Topology next(index.frame());
-  for (std::size_t b = 0; b < kept.size(); ++b) next.insert_brick(index.bricks()[b].coord, kept[b]);
-  next.dilate(options.dilate_voxels);
-  if (lattice > 0) next.erase_inside(volume.index(lattice - 1).frame().box());
-  return options.subdivide ? next.subdivided() : next;
+  next.insert_bricks(bricks, threads);
+  next.dilate(options.dilate_voxels, threads);
+  if (lattice > 0) next.erase_inside(volume.index(lattice - 1).frame().box(), threads);
+  return options.subdivide ? next.subdivided(threads) : next;
 }
 
 // The channels of one lattice of the new volume, from the old one.
@@ -84,9 +86,9 @@ Volume refine(const Volume& volume, const RefineOptions& options, int threads) {
   std::vector<Topology> lattices;
   for (int k = 0; k < volume.lattice_count(); ++k) {
     kept.push_back(kept_masks(volume, k, options, threads));
-    lattices.push_back(next_topology(volume, k, kept.back(), options));
+    lattices.push_back(next_topology(volume, k, kept.back(), options, threads));
   }
-  Volume next(std::move(lattices));
+  Volume next(std::move(lattices), threads);
   const Inheritance inherit(volume, options, next);
   for (int k = 0; k < next.lattice_count(); ++k) {
     const std::vector<Brick>& bricks = next.index(k).bricks();

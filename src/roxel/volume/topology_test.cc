@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <random>
 #include <set>
 #include <tuple>
 
@@ -160,6 +161,58 @@ TEST(Topology, CopiesAreIndependent) {
   copy.erase_brick({0, 0, 0}, BrickMask().set());
   EXPECT_EQ(original.voxel_count(), 2);
   EXPECT_EQ(copy.voxel_count(), 0);
+}
+// So many bricks that every thread gets some.
+Topology scattered_bricks(int side_in_bricks, double share) {
+  std::mt19937 random(7);
+  std::bernoulli_distribution has_voxels(share), exists(0.02);
+  Topology topology({Eigen::Vector3d::Zero(), 1.0, Eigen::Vector3i::Constant(side_in_bricks)});
+  std::vector<BrickVoxels> bricks;
+  for (int z = 0; z < side_in_bricks; ++z)
+    for (int y = 0; y < side_in_bricks; ++y)
+      for (int x = 0; x < side_in_bricks; ++x) {
+        if (!has_voxels(random)) continue;
+        BrickVoxels& brick = bricks.emplace_back(BrickVoxels{{x, y, z}, {}});
+        for (int v = 0; v < kBrickVoxels; ++v) brick.mask[v] = exists(random);
+      }
+  topology.insert_bricks(bricks);
+  return topology;
+}
+
+TEST(Topology, EditsNeverDependOnTheNumberOfThreads) {
+  const Topology before = scattered_bricks(14, 0.6);
+  const std::vector<BrickVoxels> bricks = before.bricks();
+  ASSERT_GT(bricks.size(), 1000u);
+  const Eigen::AlignedBox3d hole(Eigen::Vector3d(21, 13, 40), Eigen::Vector3d(77, 90, 66));
+  const auto edited = [&](int threads) {
+    Topology topology(before.frame());
+    topology.insert_bricks(bricks, threads);
+    topology.dilate(3, threads);
+    topology.erase_inside(hole, threads);
+    return topology.subdivided(threads).bricks(threads);
+  };
+  const std::vector<BrickVoxels> one = edited(1);
+  for (const int threads : {2, 4}) EXPECT_TRUE(edited(threads) == one) << threads << " threads";
+}
+
+TEST(Topology, ManyBricksAreInsertedAsOneByOne) {
+  const std::vector<BrickVoxels> bricks = scattered_bricks(5, 0.7).bricks();
+  Topology one_by_one(small_frame()), at_once(small_frame());
+  for (Topology* topology : {&one_by_one, &at_once}) topology->insert({3, 4, 5});
+  for (const BrickVoxels& brick : bricks) one_by_one.insert_brick(brick.brick, brick.mask);
+  at_once.insert_bricks(bricks, 2);
+  EXPECT_EQ(voxels(at_once), voxels(one_by_one));
+  EXPECT_TRUE(at_once.contains({3, 4, 5}));
+}
+
+// Dilation takes a brick's width at most at once.
+TEST(Topology, DilationOfMoreThanABrickGoesOn) {
+  Topology topology({Eigen::Vector3d::Zero(), 1.0, Eigen::Vector3i(6, 5, 4)});
+  topology.insert({23, 0, 31});
+  topology.dilate(17);
+  EXPECT_EQ(topology.voxel_count(), 35L * 18 * 18);
+  EXPECT_TRUE(topology.contains({6, 17, 14}) && topology.contains({40, 0, 31}));
+  EXPECT_FALSE(topology.contains({5, 0, 31}) || topology.contains({23, 18, 31}));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "roxel/base/error.h"
+#include "roxel/base/parallel.h"
 
 namespace roxel {
 namespace {
@@ -41,33 +42,43 @@ void check_bounds(const Eigen::AlignedBox3d& bounds, double voxel_size) {
     throw_invalid("volume", "bounds " + text(bounds), "finite numbers, each minimum below its maximum");
 }
 
+/// Fills all but the brick's first slot.
+void set_voxels(const BrickVoxels& found, Brick& brick) {
+  brick.coord = found.brick;
+  const BrickMask low(0xffffffffu);
+  for (std::size_t w = 0; w < brick.word.size(); ++w)
+    brick.word[w] = static_cast<std::uint32_t>((found.mask >> 32 * w & low).to_ulong());
+  brick.before[0] = 0;
+  for (std::size_t w = 1; w < brick.word.size(); ++w)
+    brick.before[w] = static_cast<std::uint16_t>(brick.before[w - 1] + std::popcount(brick.word[w - 1]));
+}
+
 }  // namespace
 
 Eigen::AlignedBox3d LatticeFrame::box() const {
   return {origin, origin + voxel_size * size_in_voxels().cast<double>()};
 }
 
-BrickIndex::BrickIndex(const Topology& topology, std::uint32_t first_slot)
+BrickIndex::BrickIndex(const Topology& topology, std::uint32_t first_slot, int threads)
     : frame_(topology.frame()), first_slot_(first_slot) {
   const std::int64_t voxels = topology.voxel_count();
   if (voxels >= static_cast<std::int64_t>(kNoSlot) - first_slot)
     throw_invalid("volume", std::to_string(voxels) + " voxels", "fewer than 2^32 in all lattices");
+  slot_count_ = static_cast<std::uint32_t>(voxels);
+  const std::vector<BrickVoxels> found = topology.bricks(threads);
+  bricks_.resize(found.size());
   const Eigen::Vector3i n = frame_.size_in_bricks;
   table_.assign(static_cast<std::size_t>(n.x()) * n.y() * n.z(), -1);
-  topology.for_each_brick([&](const Eigen::Vector3i& coord, const BrickMask& mask) {
-    table_[coord.x() +
-           static_cast<std::size_t>(n.x()) * (coord.y() + static_cast<std::size_t>(n.y()) * coord.z())] =
-        static_cast<std::int32_t>(bricks_.size());
-    Brick& brick = bricks_.emplace_back();
-    brick.coord = coord;
-    brick.first_slot = first_slot_ + slot_count_;
-    brick.word.fill(0);
-    for (auto v = mask._Find_first(); v < mask.size(); v = mask._Find_next(v))
-      brick.word[v / 32] |= std::uint32_t{1} << v % 32;
-    brick.before[0] = 0;
-    for (std::size_t w = 1; w < brick.word.size(); ++w)
-      brick.before[w] = static_cast<std::uint16_t>(brick.before[w - 1] + std::popcount(brick.word[w - 1]));
-    slot_count_ += brick.count();
+  std::uint32_t next = first_slot_;
+  for (std::size_t b = 0; b < found.size(); ++b) {
+    const Eigen::Vector3i& at = found[b].brick;
+    table_[at.x() + static_cast<std::size_t>(n.x()) * (at.y() + static_cast<std::size_t>(n.y()) * at.z())] =
+        static_cast<std::int32_t>(b);
+    bricks_[b].first_slot = next;
+    next += static_cast<std::uint32_t>(found[b].mask.count());
+  }
+  parallel_for_blocks(found.size(), 256, threads, [&](std::int64_t begin, std::int64_t end, int) {
+    for (std::int64_t b = begin; b < end; ++b) set_voxels(found[b], bricks_[b]);
   });
 }
 
@@ -95,24 +106,24 @@ std::vector<LatticeFrame> nested_frames(const Eigen::AlignedBox3d& bounds, doubl
   return frames;
 }
 
-Volume::Volume(std::vector<Topology> lattices) : topologies_(std::move(lattices)) {
+Volume::Volume(std::vector<Topology> lattices, int threads) : topologies_(std::move(lattices)) {
   indices_.reserve(topologies_.size());
   for (const Topology& topology : topologies_) {
-    indices_.emplace_back(topology, slot_count_);
+    indices_.emplace_back(topology, slot_count_, threads);
     slot_count_ += indices_.back().slot_count();
   }
-  resize_channels();
+  resize_channels(threads);
 }
 
 std::uint32_t Volume::box_slot_count() const { return indices_.empty() ? 0 : indices_.front().slot_count(); }
 
-void Volume::resize_channels() {
-  tau.resize(slot_count_);
-  confidence.resize(slot_count_);
-  color_weight.resize(slot_count_);
-  color_mean.resize(slot_count_);
-  color_cov.resize(slot_count_);
-  support.resize(slot_count_);
+void Volume::resize_channels(int threads) {
+  // Most of the time goes by as the system hands out pages, one channel at a time a thread.
+  const std::array<std::function<void()>, 6> resize = {
+      [this] { color_cov.resize(slot_count_); },  [this] { color_mean.resize(slot_count_); },
+      [this] { support.resize(slot_count_); },    [this] { tau.resize(slot_count_); },
+      [this] { confidence.resize(slot_count_); }, [this] { color_weight.resize(slot_count_); }};
+  parallel_for(resize.size(), threads, [&](std::int64_t i, int) { resize[i](); });
 }
 
 float alpha_from_tau(float tau) { return -std::expm1(-std::clamp(tau, 0.0f, kMaxTau)); }

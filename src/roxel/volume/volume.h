@@ -24,6 +24,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 namespace roxel {
@@ -54,7 +55,16 @@ struct LatticeFrame {
 /// The voxels of one brick: bit voxel_in_brick(i, j, k).
 using BrickMask = std::bitset<kBrickVoxels>;
 
-/// Which voxels of a lattice exist. Copyable value; edits keep to the frame's box.
+/// Some of a brick's voxels.
+struct BrickVoxels {
+  Eigen::Vector3i brick;
+  BrickMask mask;
+
+  bool operator==(const BrickVoxels& other) const { return brick == other.brick && mask == other.mask; }
+};
+
+/// Which voxels of a lattice exist. Copyable value; edits keep to the frame's box. `threads` changes no
+/// result.
 class Topology {
  public:
   explicit Topology(const LatticeFrame& frame);
@@ -71,15 +81,19 @@ class Topology {
 
   /// Adds the set bits of a brick's mask.
   void insert_brick(const Eigen::Vector3i& brick, const BrickMask& mask);
+  /// The same for many bricks, each of them named at most once.
+  void insert_bricks(std::span<const BrickVoxels> bricks, int threads = 1);
   /// Removes the set bits of a brick's mask.
   void erase_brick(const Eigen::Vector3i& brick, const BrickMask& mask);
   /// Adds all voxels within `voxels` steps over faces, edges and corners, clipped to the box.
-  void dilate(int voxels);
+  void dilate(int voxels, int threads = 1);
   /// Removes all voxels whose centre is inside `box` (world): keeps surround out of the lattice within.
-  void erase_inside(const Eigen::AlignedBox3d& box);
+  void erase_inside(const Eigen::AlignedBox3d& box, int threads = 1);
   /// The same voxels divided into eight: a lattice of half the voxel size and twice the bricks a side.
-  Topology subdivided() const;
+  Topology subdivided(int threads = 1) const;
 
+  /// Every brick that has voxels, x fastest, then y, then z.
+  std::vector<BrickVoxels> bricks(int threads = 1) const;
   /// Calls visit(brick, mask) for every brick that has voxels, x fastest, then y, then z.
   void for_each_brick(const std::function<void(const Eigen::Vector3i&, const BrickMask&)>& visit) const;
 
@@ -129,7 +143,7 @@ class BrickIndex {
  public:
   BrickIndex() = default;
   /// Slots are handed out from first_slot on, brick by brick (x fastest), voxel by voxel (x fastest).
-  BrickIndex(const Topology& topology, std::uint32_t first_slot);
+  BrickIndex(const Topology& topology, std::uint32_t first_slot, int threads = 1);
 
   const LatticeFrame& frame() const { return frame_; }
   std::uint32_t first_slot() const { return first_slot_; }
@@ -163,7 +177,7 @@ std::vector<LatticeFrame> nested_frames(const Eigen::AlignedBox3d& bounds, doubl
 class Volume {
  public:
   Volume() = default;
-  explicit Volume(std::vector<Topology> lattices);
+  explicit Volume(std::vector<Topology> lattices, int threads = 1);
 
   int lattice_count() const { return static_cast<int>(topologies_.size()); }
   const Topology& topology(int lattice) const { return topologies_[lattice]; }
@@ -185,7 +199,7 @@ class Volume {
   /// Empty where that is color_mean, of each voxel for itself.
   std::vector<std::array<float, 3>> fitted_color;
 
-  void resize_channels();
+  void resize_channels(int threads = 1);
 
  private:
   std::vector<Topology> topologies_;

@@ -5,6 +5,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <set>
 
 #include "roxel/base/error.h"
@@ -135,6 +136,27 @@ TEST(Volume, LatticesShareOneRangeOfSlots) {
       (std::vector<std::size_t>{volume.tau.size(), volume.confidence.size(), volume.color_weight.size(),
                                 volume.color_mean.size(), volume.color_cov.size(), volume.support.size()}),
       testing::Each(3u));
+}
+
+TEST(Volume, NeverDependsOnTheNumberOfThreads) {
+  Topology topology({Eigen::Vector3d::Zero(), 1.0, Eigen::Vector3i::Constant(10)});
+  std::mt19937 random(3);
+  for (int n = 0; n < 20000; ++n)
+    topology.insert(Eigen::Vector3i(random() % 80, random() % 80, random() % 80));
+  const Volume one({topology, topology}, 1);
+  ASSERT_GT(one.index(0).bricks().size(), 900u);
+  for (const int threads : {2, 4}) {
+    const Volume many({topology, topology}, threads);
+    ASSERT_EQ(many.slot_count(), one.slot_count());
+    EXPECT_EQ(many.color_cov.size(), one.color_cov.size());
+    for (const int k : {0, 1})
+      for (std::size_t b = 0; b < one.index(k).bricks().size(); ++b) {
+        const Brick &brick = many.index(k).bricks()[b], &expected = one.index(k).bricks()[b];
+        ASSERT_EQ(brick.coord, expected.coord);
+        ASSERT_EQ(brick.first_slot, expected.first_slot);
+        ASSERT_TRUE(brick.word == expected.word && brick.before == expected.before);
+      }
+  }
 }
 
 TEST(Volume, IsEmptyByDefault) {
