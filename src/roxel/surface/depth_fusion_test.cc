@@ -146,16 +146,34 @@ TEST(DepthFusion, WhatHolesNeedCountsAsMemoryToo) {
   EXPECT_GT(least(60), 2 * least(0));
 }
 
+/// The least memory, to a sixteenth, in which `work` does not throw InvalidInput.
+std::int64_t least_memory(const std::function<void(std::int64_t bytes)>& work) {
+  const auto fits = [&](std::int64_t bytes) {
+    try {
+      work(bytes);
+    } catch (const InvalidInput&) {
+      return false;
+    }
+    return true;
+  };
+  std::int64_t too_little = 1 << 16, enough = too_little;
+  while (!fits(enough *= 2)) too_little = enough;
+  while (enough - too_little > enough / 16) {
+    const std::int64_t middle = (enough + too_little) / 2;
+    (fits(middle) ? enough : too_little) = middle;
+  }
+  return enough;
+}
+
 TEST(DepthFusion, ViewsCountAsMemoryTooAndHowManyAreHeldChangesNothing) {
   // The same wall, with four times the pixels.
   const auto least = [](int size) {
     FusionOptions options = wall_options();
     options.hole_size = 0;
-    for (options.most_bytes = 1 << 16;; options.most_bytes += options.most_bytes / 16) try {
-        fused({wall(2.0f, 0.01f, size), wall(2.0f, 0.01f, size)}, options);
-        return options.most_bytes;
-      } catch (const InvalidInput&) {
-      }
+    return least_memory([&](std::int64_t bytes) {
+      options.most_bytes = bytes;
+      fused({wall(2.0f, 0.01f, size), wall(2.0f, 0.01f, size)}, options);
+    });
   };
   // Of each of two views on two threads 64 bytes a pixel while it is read, and 8 once it is ready.
   EXPECT_GT(least(512), least(256) + 2 * (512 * 512 - 256 * 256) * 70);
@@ -178,13 +196,13 @@ TEST(DepthFusion, ViewsCountAsMemoryTooAndHowManyAreHeldChangesNothing) {
   const Outcome expected = outcome(ample);
   EXPECT_EQ(expected.loaded, 8);  // they stay
   FusionOptions tight = ample;
-  for (tight.most_bytes = 1 << 20;; tight.most_bytes += tight.most_bytes / 16) try {
-      const Outcome found = outcome(tight);
-      EXPECT_EQ(found.points, expected.points);
-      EXPECT_EQ(found.loaded, 16);  // they are read twice
-      break;
-    } catch (const InvalidInput&) {
-    }
+  tight.most_bytes = least_memory([&](std::int64_t bytes) {
+    tight.most_bytes = bytes;
+    outcome(tight);
+  });
+  const Outcome found = outcome(tight);
+  EXPECT_EQ(found.points, expected.points);
+  EXPECT_EQ(found.loaded, 16);  // they are read twice
 }
 
 // Far off the axis directions are much longer than 1 a unit of depth: so is what turns depth into distance.
