@@ -27,8 +27,8 @@ constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
-/// Contrast of a spot that is a sun without glare: lamps and white walls have less. Where dark photographs clip,
-/// walls come to 50.
+/// Contrast of a spot that is a sun without glare: lamps and white walls have less. Where dark photographs
+/// clip, walls come to 50.
 constexpr double kSurelySun = 30, kSurelySunThoughClipped = 300;
 /// Of log sunlight, over nine skies (docs/results/sky.md); of a measurement, at least.
 constexpr double kEstimatedSunSigma = 0.47, kMeasuredSunSigma = 0.02;
@@ -497,6 +497,8 @@ class Fitting {
     const bool apart = warn_of_suns();
     if (!out_.fitted.has_light()) return;
     warn_of_found_sun();
+    if (options_.residual_order > 0 && sky().has_light() && sky().model != SkyModel::kPerez)
+      say(formatted("--residual has no effect where the model is %s", to_string(sky().model)));
     if (!apart && clear_without_sun() && sky().sun_source != SunSource::kImages)
       say(formatted(
           "the sky is clear where the sun %s should be, and no sun is there: a wrong time, place or "

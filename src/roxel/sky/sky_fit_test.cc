@@ -474,8 +474,11 @@ TEST(FitSky, SaysHowMuchOfWhatLooksLikeSkyItCouldUse) {
 TEST(FitSky, AnUnknownSunLeavesGradation) {
   Square square;
   square.wall = 0.05f;
-  const SkyFit fit = fit_one(panorama_of(overcast_sky(), square));
+  SkyFitOptions options;
+  options.residual_order = 2;
+  const SkyFit fit = fit_one(panorama_of(overcast_sky(), square), options);
   EXPECT_EQ(fit.sky.model, SkyModel::kGradation);
+  EXPECT_TRUE(warns(fit, "--residual has no effect where the model is gradation"));
   EXPECT_EQ(fit.sky.fallback, "sun not known");
   EXPECT_EQ(fit.sky.channels[0].shape.c, 0);
   EXPECT_LT(dome_difference(fit.sky, overcast_sky()), 0.03);

@@ -294,7 +294,8 @@ TEST(Glares, TakesSkyAllAroundThatIsBrighterBesideTheSpot) {
   const auto right = [&](const Eigen::Vector3d& d) { return d.cross(at).z() < 0.02; };
   EXPECT_FALSE(glares(glowing(at, 5, right), sky, spot)) << "the picture ends beside it";
   EXPECT_TRUE(glares(glowing(at, 5, all), sky_where(right), spot)) << "a house hides half";
-  EXPECT_FALSE(glares(glowing(at, 5, all), sky_where([&](const Eigen::Vector3d& d) { return d.z() > at.z() + 0.06; }), spot))
+  EXPECT_FALSE(glares(glowing(at, 5, all),
+                      sky_where([&](const Eigen::Vector3d& d) { return d.z() > at.z() + 0.06; }), spot))
       << "a wall below the sky";
 }
 

@@ -13,8 +13,8 @@ constexpr double kLeastContrast = 12;
 constexpr double kWidestPatchDeg = 20;  ///< radius
 /// Of the rings around a sun: roofs may hide half, the pictures' edges hardly any.
 constexpr double kAmidSky = 0.4, kSkyAway = 0.3, kAllInView = 0.9;
-/// Brightness of the sky beside a sun over that further away: 1.7 to 2.8 on courtyard's photographs of 8 bits up to
-/// four times its exposure, and up to 1.7 beside walls, where it is horizon that is brighter.
+/// Brightness of the sky beside a sun over that further away: 1.7 to 2.8 on courtyard's photographs of 8 bits
+/// up to four times its exposure, and up to 1.7 beside walls, where it is horizon that is brighter.
 constexpr double kGlare = 1.7;
 constexpr double kClusterDeg = 3;
 constexpr double kLowestSunSine = -0.02;
@@ -69,8 +69,8 @@ void add_patches(const SphereLight& light, bool (*clips)(const FacetLight&),
   }
 }
 
-/// Facets that clip altogether, where a few pixels may join the sun to a wall; and those that clip at all, which
-/// hold a small sun.
+/// Facets that clip altogether, where a few pixels may join the sun to a wall; and those that clip at all,
+/// which hold a small sun.
 std::vector<FoundSun> clipped_patches(const SphereLight& light) {
   std::vector<std::pair<std::size_t, FoundSun>> patches;
   add_patches(light, is_clipped, patches);
