@@ -27,8 +27,9 @@ constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
-constexpr double kSurelySun = 30;  ///< contrast of a spot worth a warning: lamps and white walls have less
-constexpr double kGlare = 1.3;     ///< brightness beside a sun over that further away
+/// Contrast of a spot that is a sun without glare: lamps and white walls have less. Where dark photographs
+/// clip, walls come to 50.
+constexpr double kSurelySun = 30, kSurelySunThoughClipped = 300;
 /// Of log sunlight, over nine skies (docs/results/sky.md); of a measurement, at least.
 constexpr double kEstimatedSunSigma = 0.47, kMeasuredSunSigma = 0.02;
 /// Facets that clip: share of the clip level that a model must come to, and how far other channels may be
@@ -72,14 +73,14 @@ class Fitting {
   SkyFit take() {
     describe();
     gather();
-    find_suns();
     out_.masks = sky_masks(out_.light, known_sun(), options_.masks);
+    look_for_sun();
     out_.used = out_.masks.sky;
     fit();
     find_clipped_sky();
     find_beyond_model();
     measure_fit();
-    make_sure_of_found_sun();
+    look_for_another_sun();
     weigh_sun();
     out_.fitted = sky();
     give_up_clipped_light();
@@ -131,13 +132,35 @@ class Fitting {
     if (measured.in_view) measures_.push_back(measured);
   }
 
-  void find_suns() {
-    found_ = find_sun(out_.light);
-    if (!found_) return;
-    sky().sun_by_images = found_->direction;
+  /// Where nothing else says where the sun is; with it the masks are others.
+  void look_for_sun() {
+    spots_ = bright_spots(out_.light);
     if (known_sun()) return;
+    find_sure_sun(out_.masks.sky);
+    if (!found_) return;
     use_sun(SunSource::kImages, found_->direction);
     for (std::size_t i = 0; i < task_.views.size(); ++i) measure(pictures_(static_cast<int>(i)));
+    out_.masks = sky_masks(out_.light, known_sun(), options_.masks);
+  }
+
+  /// Where time or hand say where the sun is, and the fit what is sky: is there one elsewhere?
+  void look_for_another_sun() {
+    if (!known_sun() || sky().sun_source == SunSource::kImages) return;
+    std::vector<std::uint8_t> taken = out_.masks.sky;
+    for (std::size_t f = 0; f < taken.size(); ++f) taken[f] |= out_.used[f];
+    find_sure_sun(taken);
+  }
+
+  /// The first of the bright spots that is surely a sun; at night lamps stand out as much.
+  void find_sure_sun(const std::vector<std::uint8_t>& taken_for_sky) {
+    const bool night = sky().fallback == kNight;
+    for (const FoundSun& spot : spots_) {
+      const bool stands_out = spot.contrast > (spot.clipped ? kSurelySunThoughClipped : kSurelySun);
+      if (!(stands_out && !night) && !glares(out_.light, taken_for_sky, spot)) continue;
+      found_ = spot;
+      sky().sun_by_images = spot.direction;
+      return;
+    }
   }
 
   double share_used() const {
@@ -414,30 +437,12 @@ class Fitting {
     sky().clearness_bin = known_sun() ? fit_perez(samples(), 1, sky().sun, fit).start : 0;
   }
 
-  /// Around a direction, from `inner` to `outer` degrees: the share that fit or masks took for sky, that of
-  /// the fit and of sky that clips, and the mean luminance of what is seen.
-  struct Ring {
-    double sky_share = 0, used_share = 0, luminance = 0;
-  };
-  Ring ring_around(const Eigen::Vector3d& direction, double inner, double outer) const {
-    Ring ring;
-    double around = 0, seen = 0;
-    for (int f = 0; f < sphere_->count(); ++f) {
-      const double apart = angle_deg(sphere_->centre(f), direction), area = sphere_->solid_angle(f);
-      if (apart < inner || apart > outer) continue;
-      around += area;
-      if (out_.used[f] || out_.clipped_sky[f]) ring.used_share += area;
-      if (out_.used[f] || out_.masks.sky[f]) ring.sky_share += area;
-      if (out_.light.facets[f].weight > 0)
-        seen += area, ring.luminance += area * luminance(out_.light.facets[f].mean);
-    }
-    if (around > 0) ring.used_share /= around, ring.sky_share /= around;
-    if (seen > 0) ring.luminance /= seen;
-    return ring;
-  }
-
   /// Whether facets around the sun were taken for sky: then nothing hides it.
-  bool sky_around_sun() const { return ring_around(out_.sky.sun, 3.5, 8).used_share > 0.5; }
+  bool sky_around_sun() const {
+    std::vector<std::uint8_t> taken = out_.used;
+    for (std::size_t f = 0; f < taken.size(); ++f) taken[f] |= out_.clipped_sky[f];
+    return sky_ring(out_.light, taken, out_.sky.sun, 3.5, 8).sky_share > 0.5;
+  }
 
   /// The sun where none is seen though the sky there is clear, brighter towards the horizon: it stands
   /// elsewhere.
@@ -481,26 +486,6 @@ class Fitting {
     s.sun_relative_sigma = std::max(kMeasuredSunSigma, std::sqrt(squares / std::max(1.0, count - 1)));
   }
 
-  /// Glare, darker further out, amid sky: a sun, however little it stands out where white is 1. The fit has
-  /// no glare where it does not know of that sun, so it need not have used the facets close by.
-  bool glares(const FoundSun& found) const {
-    const Ring near = ring_around(found.direction, found.radius_deg + 1, found.radius_deg + 5),
-               far = ring_around(found.direction, found.radius_deg + 10, found.radius_deg + 20);
-    return far.sky_share > 0.5 && near.luminance > kGlare * far.luminance;
-  }
-
-  /// Whether the bright spot of the images is a sun; one that glares comes before what is merely bright.
-  void make_sure_of_found_sun() {
-    surely_ = found_ && found_->contrast > kSurelySun;
-    if (!out_.sky.has_light() || sky().sun_source == SunSource::kImages) return;
-    for (const FoundSun& spot : clipped_spots(out_.light)) {
-      if (!glares(spot)) continue;
-      found_ = spot, surely_ = true;
-      sky().sun_by_images = spot.direction;
-      return;
-    }
-  }
-
   void warn() {
     const auto say = [&](std::string text) { out_.warnings.push_back(std::move(text)); };
     if (const int by_hand = out_.light.masked_by_hand; by_hand > 0 && by_hand < out_.light.pictures)
@@ -510,8 +495,11 @@ class Fitting {
     if (out_.pixels_per_facet > 0 && out_.pixels_per_facet < kFewPixels && sphere_->level() > 4)
       say(formatted("%.1f pixels a facet: too few to tell texture, take fewer facets (--facets %d)",
                     out_.pixels_per_facet, sphere_->level() - 1));
-    if (!out_.fitted.has_light()) return;
     const bool apart = warn_of_suns();
+    if (!out_.fitted.has_light()) return;
+    warn_of_found_sun();
+    if (options_.residual_order > 0 && sky().has_light() && sky().model != SkyModel::kPerez)
+      say(formatted("--residual has no effect where the model is %s", to_string(sky().model)));
     if (!apart && clear_without_sun() && sky().sun_source != SunSource::kImages)
       say(formatted(
           "the sky is clear where the sun %s should be, and no sun is there: a wrong time, place or "
@@ -542,13 +530,34 @@ class Fitting {
   bool warn_of_suns() {
     if (!found_ || sky().sun_source == SunSource::kImages) return false;
     const double apart = angle_deg(sky().sun, found_->direction);
-    if (apart < kSunsDifferDeg || !surely_) return false;
+    if (apart < kSunsDifferDeg + middle_within()) return false;
     if (shines_ && sky_around_sun()) return false;  // it is where it should be: the other is a reflection
-    out_.warnings.push_back(
-        formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
-                  "reflection, or a wrong time, place or north",
-                  by_what(), apart));
+    if (sky().fallback == kNight)
+      out_.warnings.push_back(
+          formatted("it is night %s, but the images show what glares amid sky as the sun does, %.1f degrees "
+                    "apart from where it should be: a wrong time, zone, place or north",
+                    by_what(), apart));
+    else
+      out_.warnings.push_back(
+          formatted("sun %s and the brightest spot of the images are %.1f degrees apart: a "
+                    "reflection, or a wrong time, place or north",
+                    by_what(), apart));
     return true;
+  }
+
+  /// How far, in degrees, the middle of a glare that clips may be from the sun: roofs cut it, and towards the
+  /// horizon it is wider (docs/sky.md).
+  double middle_within() const { return found_->clipped ? found_->radius_deg / 2 : 0; }
+
+  void warn_of_found_sun() {
+    if (sky().sun_source == SunSource::kImages && middle_within() > kSunsDifferDeg)
+      out_.warnings.push_back(formatted(
+          "the sun is the middle of a glare that clips, within %.0f degrees: give time and place, or --sun",
+          middle_within()));
+    if (sky().model == SkyModel::kGradation && !spots_.empty())
+      out_.warnings.push_back(
+          "the sun is not known: what is brightest in the images need not be it; give time and place, or "
+          "--sun");
   }
 
   const SkyTask& task_;
@@ -556,8 +565,8 @@ class Fitting {
   const SkyFitOptions& options_;
   std::shared_ptr<const FacetSphere> sphere_;
   std::vector<SunMeasure> measures_;
-  std::optional<FoundSun> found_;
-  bool surely_ = false;                 ///< found_ is a sun
+  std::vector<FoundSun> spots_;         ///< bright ones of the images
+  std::optional<FoundSun> found_;       ///< the one of them that is surely a sun
   bool dark_ = false, shines_ = false;  ///< in an image, where the sun should be
   bool clipped_ = false;                ///< its disc, in an image
   bool fitted_before_ = false;          ///< channels hold a fit of this model

@@ -22,6 +22,13 @@ double dome_difference(const NodeSky& ours, const NodeSky& truth) {
   return sum / count;
 }
 
+/// Where a fit to a wrong sun takes all rounds: enough for what is warned of.
+SkyFitOptions quick() {
+  SkyFitOptions options;
+  options.facet_level = 4;
+  return options;
+}
+
 /// Intersection over union of a mask's sky with the truth.
 double iou(const Mask& sky, const Mask& surface) {
   double both = 0, either = 0;
@@ -104,7 +111,7 @@ TEST(FitSky, TheSunsRegionOverridesTheMasks) {
 }
 
 TEST(FitSky, WarnsWhereTimeAndImagesDisagreeOnTheSun) {
-  const SkyFit wrong = fit_one(panorama_of(clear_sky(20, 50), {}), {}, noon());
+  const SkyFit wrong = fit_one(panorama_of(clear_sky(20, 50), {}), quick(), noon());
   EXPECT_TRUE(warns(wrong, "degrees apart"));
   EXPECT_EQ(wrong.sky.sun_source, SunSource::kTime);
   ASSERT_TRUE(wrong.sky.sun_by_images && wrong.sky.sun_by_time);
@@ -114,7 +121,7 @@ TEST(FitSky, WarnsWhereTimeAndImagesDisagreeOnTheSun) {
 }
 
 TEST(FitSky, ASunByHandComesFirst) {
-  SkyFitOptions options;
+  SkyFitOptions options = quick();
   options.sun = SunPosition{77, 33};
   const SkyFit fit = fit_one(panorama_of(clear_sky(), {}), options, noon());
   EXPECT_EQ(fit.sky.sun_source, SunSource::kGiven);
@@ -300,6 +307,88 @@ TEST(FitSky, WarnsOfAWrongTimeInPhotographsToo) {
             "apart"));
 }
 
+/// One picture of 20 x 15 degrees, looking up at an angle.
+SkyPicture narrow_picture(const NodeSky& sky) {
+  PinholeCamera camera;
+  camera.intrinsics = {120, 90, 340, 340, 60, 45, 0};
+  camera.pose.rotation << 1, 0, 0, 0, 0.8, -0.6, 0, 0.6, 0.8;
+  SkyPicture picture{Image(120, 90, 3), {}, {}, PixelRays(camera, Eigen::Matrix3d::Identity())};
+  for (int y = 0; y < 90; ++y)
+    for (int x = 0; x < 120; ++x) {
+      const Eigen::Vector3f seen =
+          sky.radiance_in_sky(picture.rays.direction(x + 0.5, y + 0.5)).cast<float>();
+      std::copy_n(seen.data(), 3, picture.rgb.pixel(x, y));
+    }
+  for (int y = 60; y < 90; ++y)
+    for (int x = 0; x < 120; ++x) std::fill_n(picture.rgb.pixel(x, y), 3, 0.02f * (1.2f + unrest(x, y)));
+  picture.clip = clip_level(picture.rgb);
+  return picture;
+}
+
+/// A wall of smooth white around a direction, as sunlit plaster is.
+SkyPicture with_white_wall(SkyPicture picture, const SunPosition& at, double radius_deg) {
+  for (int y = 0; y < 180; ++y)
+    for (int x = 0; x < 360; ++x)
+      if (picture.rays.direction(x + 0.5, y + 0.5).dot(sun_direction(at)) > std::cos(radius_deg * kDegree))
+        std::fill_n(picture.rgb.pixel(x, y), 3, 1.5f);
+  return picture;
+}
+
+TEST(FitSky, InPhotographsTheSunIsWhatGlaresAmidSkyAndNoWall) {
+  const NodeSky truth = clear_sky();
+  const SkyPicture picture = with_white_wall(panorama_of(truth, {}), {330, 8}, 6);
+  for (const float gain : {1.0f, 2.5f}) {
+    SCOPED_TRACE(gain);  // the sun's own glare is smaller than the wall, and wider
+    const SkyFit fit = fit_one(exposed(picture, gain));
+    ASSERT_EQ(fit.sky.sun_source, SunSource::kImages);
+    EXPECT_GT(fit.sky.sun.dot(truth.sun), std::cos(4 * kDegree));
+    EXPECT_EQ(fit.sky.sun_light, SunLight::kEstimated);
+  }
+}
+
+TEST(FitSky, AWallThatClipsIsNoSunWhereNoneIsInView) {
+  Square square;
+  square.disc = false, square.wall = 0.02f;
+  const SkyPicture picture = with_white_wall(panorama_of(overcast_sky(), square), {330, 8}, 5);
+  const SkyFit fit = fit_one(exposed(picture, 1));
+  EXPECT_EQ(fit.sky.sun_source, SunSource::kNone);
+  EXPECT_FALSE(fit.sky.sun_by_images);
+  EXPECT_EQ(fit.sky.fallback, "sun not known");
+  EXPECT_TRUE(warns(fit, "the sun is not known"));
+  const SkyFit timed = fit_one(exposed(picture, 1), {}, noon());
+  EXPECT_FALSE(timed.sky.sun_by_images);
+  EXPECT_FALSE(warns(timed, "apart"));
+}
+
+TEST(FitSky, ASpotInALittleSkyIsNoSun) {
+  SkyPicture picture = narrow_picture(clear_sky(181.2, 59.7));
+  for (int y = 30; y < 34; ++y)
+    for (int x = 50; x < 54; ++x) std::fill_n(picture.rgb.pixel(x, y), 3, 4.0f);
+  const SkyFit fit = fit_one(exposed(picture, 1));
+  EXPECT_EQ(fit.sky.sun_source, SunSource::kNone);
+  EXPECT_EQ(fit.sky.model, SkyModel::kUniform);
+}
+
+TEST(FitSky, WarnsOfANightInWhichTheSunShines) {
+  SkyTask night = noon();
+  *night.time_utc_s += 12 * 3600;
+  const SkyPicture day = panorama_of(clear_sky(), {});
+  for (const SkyPicture& seen : {day, exposed(day, 1)}) {
+    const SkyFit fit = fit_one(seen, {}, night);
+    EXPECT_EQ(fit.sky.fallback, "night");
+    EXPECT_TRUE(warns(fit, "it is night by time"));
+  }
+  SkyFitOptions below;
+  below.sun = SunPosition{10, -30};
+  EXPECT_TRUE(warns(fit_one(day, below), "it is night by hand"));
+  Square lamp;  // as bright as a sun, beside a black sky
+  lamp.disc = false;
+  SkyPicture dark = panorama_of(overcast_sky(), lamp);
+  for (float& value : dark.rgb.data()) value *= 1e-3f;
+  dark = with_white_wall(dark, {330, 20}, 2);
+  EXPECT_TRUE(fit_one(dark, {}, night).warnings.empty());
+}
+
 TEST(FitSky, AReflectionIsNoSecondSunWhereTheFirstIsSeen) {
   SkyPicture picture = panorama_of(clear_sky(181.19, 59.73), {});
   for (int y = 80; y < 83; ++y)
@@ -315,7 +404,7 @@ TEST(FitSky, AReflectionIsNoSecondSunWhereTheFirstIsSeen) {
 TEST(FitSky, WarnsOfAClearSkyWithoutTheSunWhereItShouldBe) {
   Square square;
   square.disc = false;
-  EXPECT_TRUE(warns(fit_one(panorama_of(clear_sky(40, 50), square), {}, noon()), "no sun is there"));
+  EXPECT_TRUE(warns(fit_one(panorama_of(clear_sky(40, 50), square), quick(), noon()), "no sun is there"));
   square.wall = 0.02f;
   EXPECT_FALSE(warns(fit_one(panorama_of(overcast_sky(), square), {}, noon()), "no sun is there"));
 }
@@ -385,29 +474,14 @@ TEST(FitSky, SaysHowMuchOfWhatLooksLikeSkyItCouldUse) {
 TEST(FitSky, AnUnknownSunLeavesGradation) {
   Square square;
   square.wall = 0.05f;
-  const SkyFit fit = fit_one(panorama_of(overcast_sky(), square));
+  SkyFitOptions options;
+  options.residual_order = 2;
+  const SkyFit fit = fit_one(panorama_of(overcast_sky(), square), options);
   EXPECT_EQ(fit.sky.model, SkyModel::kGradation);
+  EXPECT_TRUE(warns(fit, "--residual has no effect where the model is gradation"));
   EXPECT_EQ(fit.sky.fallback, "sun not known");
   EXPECT_EQ(fit.sky.channels[0].shape.c, 0);
   EXPECT_LT(dome_difference(fit.sky, overcast_sky()), 0.03);
-}
-
-/// One picture of 20 x 15 degrees, looking up at an angle.
-SkyPicture narrow_picture(const NodeSky& sky) {
-  PinholeCamera camera;
-  camera.intrinsics = {120, 90, 340, 340, 60, 45, 0};
-  camera.pose.rotation << 1, 0, 0, 0, 0.8, -0.6, 0, 0.6, 0.8;
-  SkyPicture picture{Image(120, 90, 3), {}, {}, PixelRays(camera, Eigen::Matrix3d::Identity())};
-  for (int y = 0; y < 90; ++y)
-    for (int x = 0; x < 120; ++x) {
-      const Eigen::Vector3f seen =
-          sky.radiance_in_sky(picture.rays.direction(x + 0.5, y + 0.5)).cast<float>();
-      std::copy_n(seen.data(), 3, picture.rgb.pixel(x, y));
-    }
-  for (int y = 60; y < 90; ++y)
-    for (int x = 0; x < 120; ++x) std::fill_n(picture.rgb.pixel(x, y), 3, 0.02f * (1.2f + unrest(x, y)));
-  picture.clip = clip_level(picture.rgb);
-  return picture;
 }
 
 TEST(FitSky, OneNarrowImageGetsAPublishedSkyOrOneColour) {

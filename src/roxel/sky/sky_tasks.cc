@@ -196,6 +196,16 @@ std::vector<std::vector<int>> split_by_time(const Dataset& dataset, const Node& 
   return groups;
 }
 
+/// Coordinates may differ by what those of one place differ by; where one view has none, it does not say
+/// otherwise.
+bool in_one_place(const View& one, const View& other) {
+  const auto alike = [&](std::optional<double> View::*field) {
+    return !(one.*field) || !(other.*field) ||
+           std::abs(std::remainder(*(one.*field) - *(other.*field), 360)) <= kSamePlace_deg;
+  };
+  return alike(&View::latitude_deg) && alike(&View::longitude_deg);
+}
+
 struct Group {
   std::optional<int> id;
   std::vector<int> views;
@@ -203,7 +213,7 @@ struct Group {
 
 std::vector<Group> group_views(const Dataset& dataset, std::vector<std::string>& warnings) {
   std::vector<Group> groups;
-  std::map<double, std::size_t> by_time;  // of single views
+  std::multimap<double, std::size_t> by_time;  // of single views
   for (const Node& node : dataset.nodes) {
     const View& first = dataset.views[node.view_idxs.front()];
     if (first.node_id) {
@@ -216,11 +226,16 @@ std::vector<Group> group_views(const Dataset& dataset, std::vector<std::string>&
     for (const std::vector<int>& views : split_by_time(dataset, node)) {
       const auto& time = dataset.views[views.front()].time_utc_s;
       if (views.size() == 1 && time) {
-        const auto [known, is_new] = by_time.try_emplace(std::round(*time), groups.size());
-        if (!is_new) {
+        const auto [begin, end] = by_time.equal_range(std::round(*time));
+        const auto known = std::find_if(begin, end, [&](const auto& entry) {
+          return in_one_place(dataset.views[groups[entry.second].views.front()],
+                              dataset.views[views.front()]);
+        });
+        if (known != end) {
           groups[known->second].views.push_back(views.front());
           continue;
         }
+        by_time.emplace(std::round(*time), groups.size());
       }
       groups.push_back({std::nullopt, views});
     }

@@ -18,10 +18,10 @@ struct DatasetSkies {
   std::vector<std::string> warnings;        ///< nodes whose cameras stand in two places
 };
 
-/// One sky a node. Nodes of a single view that share a time (to the second) share a sky; views of one place
-/// taken more than a quarter of an hour apart do not. Tasks are named by node id ("n03"), else by count.
-/// Without `up` (world, any length) it is +Z where places are given or cameras agree, else the axis that most
-/// cameras hold upright. Throws InvalidInput where one node id stands for two nodes: two times, two
+/// One sky a node. Nodes of a single view that share a time (to the second) and place share a sky; views of
+/// one place taken more than a quarter of an hour apart do not. Tasks are named by node id ("n03"), else by
+/// count. Without `up` (world, any length) it is +Z where places are given or cameras agree, else the axis
+/// that most cameras hold upright. Throws InvalidInput where one node id stands for two nodes: two times, two
 /// latitudes or longitudes, or cameras in two places that are farther apart than nodes are.
 DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<double, 3>>& up = std::nullopt);
 

@@ -100,6 +100,16 @@ TEST(SkyTasks, OneNodeInTwoCitiesIsAnErrorThatNamesTheFrames) {
             1u);
 }
 
+TEST(SkyTasks, SingleImagesOfOneTimeInTwoCitiesHaveTwoSkies) {
+  const DatasetSkies skies = sky_tasks(dataset(
+      {placed(view("a", {0, 0, 0}, 500), 42.36, -71.09), placed(view("b", {3, 0, 0}, 500), 48.1, 11.6),
+       placed(view("c", {6, 0, 0}, 500), 42.365, -71.095), placed(view("d", {9, 0, 0}, 500), 48.1, 11.6)}));
+  ASSERT_THAT(names(skies), ElementsAre("n00", "n01"));
+  EXPECT_THAT(skies.tasks[0].views, ElementsAre("a", "c"));
+  EXPECT_THAT(skies.tasks[1].views, ElementsAre("b", "d"));
+  EXPECT_EQ(skies.tasks[1].latitude_deg, 48.1);
+}
+
 /// Three nodes 10 apart, of two views each, and a view "x" of node 1 (which stands at 0) at a distance.
 Dataset three_nodes_and(double distance) {
   std::vector<View> views;

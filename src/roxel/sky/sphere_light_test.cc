@@ -231,19 +231,21 @@ TEST(SphereLight, LeavesClippedPixelsOutOfMeans) {
   EXPECT_NEAR(clipped, weight, 1e-9);
 }
 
-TEST(FindSun, IsTheBrightestClusterToAPixel) {
+TEST(BrightSpots, AreTheBrightestClusterToAPixel) {
   for (const double elevation : {15.0, 40.0, 75.0}) {
     const NodeSky sky = clear_sky(222, elevation);
-    const auto found = find_sun(light_of({panorama_of(sky, {})}, 5));
-    ASSERT_TRUE(found);
-    EXPECT_GT(found->direction.dot(sky.sun), std::cos(1 * kDegree)) << "a pixel";
-    EXPECT_FALSE(found->clipped);
+    const auto found = bright_spots(light_of({panorama_of(sky, {})}, 5));
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_GT(found[0].direction.dot(sky.sun), std::cos(1 * kDegree)) << "a pixel";
+    EXPECT_FALSE(found[0].clipped);
   }
 }
 
-TEST(FindSun, FindsNoneUnderCloud) { EXPECT_FALSE(find_sun(light_of({panorama_of(overcast_sky(), {})}, 5))); }
+TEST(BrightSpots, AreNoneUnderCloud) {
+  EXPECT_TRUE(bright_spots(light_of({panorama_of(overcast_sky(), {})}, 5)).empty());
+}
 
-TEST(FindSun, TakesTheMiddleOfASmallClippedPatch) {
+TEST(BrightSpots, TakeTheMiddleOfASmallClippedPatch) {
   SkyPicture picture = panorama_of(clear_sky(100, 35), {});
   // The glare is four degrees across.
   for (int y = 0; y < 180; ++y)
@@ -255,10 +257,46 @@ TEST(FindSun, TakesTheMiddleOfASmallClippedPatch) {
       }
     }
   picture.clip = clip_level(picture.rgb);
-  const auto found = find_sun(light_of({picture}, 5));
-  ASSERT_TRUE(found);
-  EXPECT_TRUE(found->clipped);
-  EXPECT_GT(found->direction.dot(clear_sky(100, 35).sun), std::cos(2 * kDegree));
+  const auto found = bright_spots(light_of({picture}, 5));
+  ASSERT_FALSE(found.empty());
+  EXPECT_TRUE(found[0].clipped);
+  EXPECT_GT(found[0].direction.dot(clear_sky(100, 35).sun), std::cos(2 * kDegree));
+}
+
+/// A sphere of sky that is 1 + glow at `at`, falls off by e in 10 degrees, and is seen where `seen` says so.
+template <class Seen>
+SphereLight glowing(const Eigen::Vector3d& at, double glow, const Seen& seen) {
+  SphereLight light{FacetSphere::of_level(5), {}, 1, 0};
+  for (int f = 0; f < light.sphere->count(); ++f) {
+    FacetLight facet;
+    const double apart = std::acos(std::clamp(light.sphere->centre(f).dot(at), -1.0, 1.0)) / kDegree;
+    if (seen(light.sphere->centre(f)))
+      facet.coverage = 1, facet.weight = 1,
+      facet.mean = Eigen::Vector3d::Constant(1 + glow * std::exp(-apart / 10));
+    light.facets.push_back(facet);
+  }
+  return light;
+}
+
+TEST(Glares, TakesSkyAllAroundThatIsBrighterBesideTheSpot) {
+  const Eigen::Vector3d at = sun_direction({120, 35});
+  const FoundSun spot{at, 10, true, 3};
+  const auto all = [](const Eigen::Vector3d&) { return true; };
+  const auto sky_where = [&](const auto& is_sky) {
+    const SphereLight light = glowing(at, 5, all);
+    std::vector<std::uint8_t> sky;
+    for (int f = 0; f < light.sphere->count(); ++f) sky.push_back(is_sky(light.sphere->centre(f)));
+    return sky;
+  };
+  const auto sky = sky_where([](const Eigen::Vector3d& d) { return d.z() > 0; });
+  EXPECT_TRUE(glares(glowing(at, 5, all), sky, spot));
+  EXPECT_FALSE(glares(glowing(at, 0.5, all), sky, spot)) << "hardly brighter";
+  const auto right = [&](const Eigen::Vector3d& d) { return d.cross(at).z() < 0.02; };
+  EXPECT_FALSE(glares(glowing(at, 5, right), sky, spot)) << "the picture ends beside it";
+  EXPECT_TRUE(glares(glowing(at, 5, all), sky_where(right), spot)) << "a house hides half";
+  EXPECT_FALSE(glares(glowing(at, 5, all),
+                      sky_where([&](const Eigen::Vector3d& d) { return d.z() > at.z() + 0.06; }), spot))
+      << "a wall below the sky";
 }
 
 TEST(MeasureSun, SumsTheDiscWithoutTheSkyAroundIt) {

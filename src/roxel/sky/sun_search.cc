@@ -10,7 +10,12 @@ namespace roxel {
 namespace {
 
 constexpr double kLeastContrast = 12;
-constexpr double kWidestPatchDeg = 7.5;  ///< radius
+constexpr double kWidestPatchDeg = 20;  ///< radius
+/// Of the rings around a sun: roofs may hide half, the pictures' edges hardly any.
+constexpr double kAmidSky = 0.4, kSkyAway = 0.3, kAllInView = 0.9;
+/// Brightness of the sky beside a sun over that further away: 1.7 to 2.8 on courtyard's photographs of 8 bits
+/// up to four times its exposure, and up to 1.7 beside walls, where it is horizon that is brighter.
+constexpr double kGlare = 1.7;
 constexpr double kClusterDeg = 3;
 constexpr double kLowestSunSine = -0.02;
 
@@ -51,57 +56,48 @@ FoundSun sun_of_patch(const SphereLight& light, const std::vector<int>& patch) {
   return sun;
 }
 
-/// The largest clipped patch that is small enough to be the sun and its glare.
-std::optional<FoundSun> find_clipped_sun(const SphereLight& light) {
+/// All patches that are small enough to be the sun and its glare.
+void add_patches(const SphereLight& light, bool (*clips)(const FacetLight&),
+                 std::vector<std::pair<std::size_t, FoundSun>>& patches) {
   std::vector<bool> seen(light.facets.size());
-  std::optional<FoundSun> best;
-  std::size_t best_size = 0;
   for (int f = 0; f < light.sphere->count(); ++f) {
-    if (seen[f] || !is_clipped(light.facets[f])) continue;
-    const std::vector<int> patch = clipped_patch(light, f, is_clipped, seen);
+    if (seen[f] || !clips(light.facets[f])) continue;
+    const std::vector<int> patch = clipped_patch(light, f, clips, seen);
     const FoundSun sun = sun_of_patch(light, patch);
-    if (sun.radius_deg > kWidestPatchDeg || sun.direction.z() < kLowestSunSine || patch.size() <= best_size)
-      continue;
-    best = sun, best_size = patch.size();
+    if (sun.radius_deg <= kWidestPatchDeg && sun.direction.z() >= kLowestSunSine)
+      patches.emplace_back(patch.size(), sun);
   }
-  return best;
+}
+
+/// Facets that clip altogether, where a few pixels may join the sun to a wall; and those that clip at all,
+/// which hold a small sun.
+std::vector<FoundSun> clipped_patches(const SphereLight& light) {
+  std::vector<std::pair<std::size_t, FoundSun>> patches;
+  add_patches(light, is_clipped, patches);
+  add_patches(light, holds_clipped, patches);
+  std::stable_sort(patches.begin(), patches.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<FoundSun> sorted;
+  for (const auto& patch : patches) sorted.push_back(patch.second);
+  return sorted;
 }
 
 }  // namespace
 
-std::vector<FoundSun> clipped_spots(const SphereLight& light) {
-  std::vector<bool> seen(light.facets.size());
-  std::vector<std::pair<std::size_t, FoundSun>> spots;
-  for (int f = 0; f < light.sphere->count(); ++f) {
-    if (seen[f] || !holds_clipped(light.facets[f])) continue;
-    const std::vector<int> patch = clipped_patch(light, f, holds_clipped, seen);
-    const FoundSun spot = sun_of_patch(light, patch);
-    if (spot.radius_deg <= kWidestPatchDeg && spot.direction.z() >= kLowestSunSine)
-      spots.emplace_back(patch.size(), spot);
-  }
-  std::stable_sort(spots.begin(), spots.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<FoundSun> sorted;
-  for (const auto& spot : spots) sorted.push_back(spot.second);
-  return sorted;
-}
-
-std::optional<FoundSun> find_sun(const SphereLight& light) {
+std::vector<FoundSun> bright_spots(const SphereLight& light) {
   const double median = median_luminance(light);
   int brightest = -1;
   for (int f = 0; f < light.sphere->count(); ++f)
     if (light.sphere->centre(f).z() > kLowestSunSine && light.facets[f].peak > 0 &&
         (brightest < 0 || light.facets[f].peak > light.facets[brightest].peak))
       brightest = f;
-  if (brightest < 0) return std::nullopt;
+  if (brightest < 0) return {};
   const double peak = light.facets[brightest].peak;
   const double contrast = median > 0 ? peak / median : 0;
-  if (light.facets[brightest].clipped > 0) {
-    auto sun = find_clipped_sun(light);
-    if (sun) sun->contrast = contrast;
-    if (sun) return sun;
-  }
-  if (!(contrast >= kLeastContrast)) return std::nullopt;
+  std::vector<FoundSun> spots;
+  if (light.facets[brightest].clipped > 0) spots = clipped_patches(light);
+  for (FoundSun& spot : spots) spot.contrast = contrast;
+  if (!(contrast >= kLeastContrast)) return spots;
   // The facet's own middle of light first, then all light around it.
   const Eigen::Vector3d start = light.facets[brightest].bright.normalized();
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -109,7 +105,36 @@ std::optional<FoundSun> find_sun(const SphereLight& light) {
     if (light.facets[f].peak > 0.05 * peak &&
         light.sphere->centre(f).dot(start) > std::cos(kClusterDeg * kDegree))
       middle += light.facets[f].bright;
-  return FoundSun{middle.normalized(), contrast, light.facets[brightest].clipped > 0, kClusterDeg};
+  spots.push_back({middle.normalized(), contrast, light.facets[brightest].clipped > 0, kClusterDeg});
+  return spots;
+}
+
+SkyRing sky_ring(const SphereLight& light, const std::vector<std::uint8_t>& sky,
+                 const Eigen::Vector3d& direction, double inner_deg, double outer_deg) {
+  const double nearest = std::cos(inner_deg * kDegree), farthest = std::cos(outer_deg * kDegree);
+  SkyRing ring;
+  double around = 0, above = 0, seen = 0, of_sky = 0, measured = 0;
+  for (int f = 0; f < light.sphere->count(); ++f) {
+    const double cosine = light.sphere->centre(f).dot(direction), area = light.sphere->solid_angle(f);
+    if (cosine > nearest || cosine < farthest) continue;
+    around += area;
+    if (light.sphere->centre(f).z() > 0) above += area, seen += area * light.facets[f].coverage;
+    if (!sky[f]) continue;
+    of_sky += area;
+    if (light.facets[f].weight > 0)
+      measured += area, ring.luminance += area * luminance(light.facets[f].mean);
+  }
+  if (around > 0) ring.sky_share = of_sky / around;
+  if (above > 0) ring.seen_share = seen / above;
+  if (measured > 0) ring.luminance /= measured;
+  return ring;
+}
+
+bool glares(const SphereLight& light, const std::vector<std::uint8_t>& sky, const FoundSun& spot) {
+  const SkyRing beside = sky_ring(light, sky, spot.direction, spot.radius_deg + 1, spot.radius_deg + 5),
+                away = sky_ring(light, sky, spot.direction, spot.radius_deg + 10, spot.radius_deg + 20);
+  return beside.seen_share > kAllInView && beside.sky_share > kAmidSky && away.sky_share > kSkyAway &&
+         beside.luminance > kGlare * away.luminance;
 }
 
 SunMeasure measure_sun(const SkyPicture& picture, const Eigen::Vector3d& sun) {

@@ -1,7 +1,7 @@
 #pragma once
 /// The sun as pictures show it: where the brightest cluster of facets is, and how much light comes from it.
 
-#include <optional>
+#include <cstdint>
 #include <vector>
 
 #include "roxel/sky/sphere_light.h"
@@ -12,16 +12,27 @@ struct FoundSun {
   Eigen::Vector3d direction;  ///< unit, sky frame
   double contrast = 0;    ///< its peak over the median luminance above the horizon; clipped: a lower bound
   bool clipped = false;   ///< direction is the middle of a clipped patch
-  double radius_deg = 0;  ///< of the patch or cluster
+  double radius_deg = 0;  ///< of the patch or cluster: its farthest facet from the middle
 };
 
-/// The brightest cluster above the horizon. None where nothing stands out: no clipped patch under 15 degrees
-/// across, and no pixel 12 times brighter than the median.
-std::optional<FoundSun> find_sun(const SphereLight& light);
+/// The brightest cluster above the horizon, and if that clips, what may be the sun and its glare: all patches
+/// that clip, up to 20 degrees from their middle to their edge, largest first. Empty where nothing stands
+/// out: no such patch, and no pixel 12 times brighter than the median. Lamps, windows and sunlit walls are
+/// among them.
+std::vector<FoundSun> bright_spots(const SphereLight& light);
 
-/// All clipped spots that are small enough to be the sun and its glare, however little of a facet they are;
-/// largest first.
-std::vector<FoundSun> clipped_spots(const SphereLight& light);
+/// Part of the sphere, from one distance to another around a direction.
+struct SkyRing {
+  double sky_share = 0;   ///< of its area
+  double seen_share = 0;  ///< of what of it is above the horizon
+  double luminance = 0;   ///< mean of what of it is sky
+};
+SkyRing sky_ring(const SphereLight& light, const std::vector<std::uint8_t>& sky,
+                 const Eigen::Vector3d& direction, double inner_deg, double outer_deg);
+
+/// Whether a spot is a sun, however little it stands out where white is 1: pictures show all that is around
+/// it, it stands amid sky (1 a facet), and that is much brighter beside it than further away.
+bool glares(const SphereLight& light, const std::vector<std::uint8_t>& sky, const FoundSun& spot);
 
 /// What a picture tells of the light of a sun in a known direction.
 struct SunMeasure {
