@@ -38,6 +38,7 @@ bench:
 	cmake --preset $(PRESET) -DROXEL_BUILD_BENCHMARKS=ON
 	cmake --build --preset $(PRESET) -j $(JOBS)
 	tools/bench.sh build/$(PRESET)
+	benchmarks/runtime/end_to_end.py --roxel build/$(PRESET)/apps/roxel/roxel
 
 results: setup
 	cmake --preset $(PRESET) -DROXEL_BUILD_BENCHMARKS=ON

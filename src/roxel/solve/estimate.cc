@@ -12,6 +12,7 @@
 #include "roxel/image/sample_pyramid.h"
 #include "roxel/infer/run_pass.h"
 #include "roxel/march/sample_plan.h"
+#include "roxel/solve/gains.h"
 
 namespace roxel {
 namespace {
@@ -158,6 +159,8 @@ std::vector<LevelNeeds> needs_of_levels(const Dataset& dataset, const Scene& sce
     needs.push_back(level_needs(estimate_level(scene, voxel_size, level == 0, load.rays, layers_of(scene)),
                                 load, largest_image_of(dataset), static_cast<int>(dataset.nodes.size()),
                                 threads));
+    if (options.illumination != IlluminationChoice::kNone)
+      needs.back().needed += SmallPhotographs::bytes(dataset);
   }
   return needs;
 }

@@ -117,6 +117,16 @@ TEST(PlanMemory, GivesUpWhatOnlySavesTimeFirst) {
   EXPECT_LT(last_peak, 0.8 * ample.peak_bytes);
 }
 
+// 102 x 102 squares of 13 bytes a photograph of 512 pixels a side, and the margin.
+TEST(PlanMemory, CountsTheSmallPhotographsThatGainsAreFittedTo) {
+  const Dataset dataset = cube_dataset(64, 512);
+  ReconstructOptions options = options_at(64);
+  options.illumination = IlluminationChoice::kNone;
+  const double none = plan_within(64e9, dataset, options).peak_bytes;
+  options.illumination = IlluminationChoice::kGain;
+  EXPECT_NEAR(plan_within(64e9, dataset, options).peak_bytes - none, 1.15 * 64 * 102 * 102 * 13, 1000);
+}
+
 TEST(PlanMemory, AShortageNamesAVoxelSizeThatFits) {
   const Dataset dataset = cube_dataset(12, 96);
   ReconstructOptions options = options_at(512);

@@ -118,6 +118,8 @@ std::array<double, 3> common_scale(const std::vector<std::array<double, 3>>& log
   return sum;
 }
 
+int side_of_squares(const Intrinsics& k) { return std::max(1, std::max(k.width, k.height) / kSide); }
+
 }  // namespace
 
 PhotographSquares squares_of(const Photograph& photo, int side, double exposure) {
@@ -134,10 +136,20 @@ const PhotographSquares& SmallPhotographs::operator()(int view_idx, double expos
   std::optional<PhotographSquares>& of_view = of_views_[view_idx];
   if (!of_view) {
     const View& view = dataset_.views[view_idx];
-    const Intrinsics& k = view.camera.intrinsics;
-    of_view = squares_of(load_(view), std::max(1, std::max(k.width, k.height) / kSide), exposure);
+    of_view = squares_of(load_(view), side_of_squares(view.camera.intrinsics), exposure);
   }
   return *of_view;
+}
+
+double SmallPhotographs::bytes(const Dataset& dataset) {
+  constexpr double kSquareBytes = 3 * sizeof(float) + 1;
+  double bytes = 0;
+  for (const View& view : dataset.views) {
+    const Intrinsics& k = view.camera.intrinsics;
+    const int side = side_of_squares(k);
+    bytes += kSquareBytes * (k.width / side) * (k.height / side);
+  }
+  return bytes;
 }
 
 std::optional<std::array<double, 3>> log_gain(const PhotographSquares& photo, const Rendering& rendering,

@@ -41,6 +41,8 @@ class SmallPhotographs {
   /// May be called for several views at once.
   const PhotographSquares& operator()(int view_idx, double exposure);
   const Dataset& dataset() const { return dataset_; }
+  /// Of all of a data set's.
+  static double bytes(const Dataset& dataset);
   /// They are read again when next asked for: their masks are others.
   void forget() { of_views_.assign(of_views_.size(), std::nullopt); }
 
