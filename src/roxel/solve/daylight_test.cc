@@ -225,7 +225,12 @@ TEST(NodesWithoutASky, DoNotBuildTheirSky) {
           fixture::CubeWorld::photograph(view.camera, std::array<float, 3>{0.3f, 0.4f, 0.6f}, true);
       if (night)
         for (float& value : photo.rgb.data()) value *= 0.3f;
-      if (night) photo.foreground = night_has_masks ? Mask(32, 32) : Mask();
+      if (night) {
+        photo.foreground = night_has_masks ? Mask(32, 32) : Mask();
+        return photo;
+      }
+      photo.sky = photo.foreground;
+      for (std::uint8_t& value : photo.sky.data()) value = static_cast<std::uint8_t>(255 - value);
       return photo;
     };
   };
