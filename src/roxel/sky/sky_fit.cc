@@ -27,9 +27,9 @@ constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
-/// Contrast of a spot that is a sun without glare: lamps and white walls have less. Where dark photographs
-/// clip, walls come to 50.
-constexpr double kSurelySun = 30, kSurelySunThoughClipped = 300;
+/// Contrast of a spot that is a sun without glare: lamps and white walls have less. Not where white is 1,
+/// which dark photographs show of walls.
+constexpr double kSurelySun = 30, kDisplayWhite = 1.0001;
 /// Of log sunlight, over nine skies (docs/results/sky.md); of a measurement, at least.
 constexpr double kEstimatedSunSigma = 0.47, kMeasuredSunSigma = 0.02;
 /// Facets that clip: share of the clip level that a model must come to, and how far other channels may be
@@ -155,7 +155,7 @@ class Fitting {
   void find_sure_sun(const std::vector<std::uint8_t>& taken_for_sky) {
     const bool night = sky().fallback == kNight;
     for (const FoundSun& spot : spots_) {
-      const bool stands_out = spot.contrast > (spot.clipped ? kSurelySunThoughClipped : kSurelySun);
+      const bool stands_out = spot.contrast > kSurelySun && spot.peak > kDisplayWhite;
       if (!(stands_out && !night) && !glares(out_.light, taken_for_sky, spot)) continue;
       found_ = spot;
       sky().sun_by_images = spot.direction;

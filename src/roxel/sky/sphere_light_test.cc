@@ -280,7 +280,7 @@ SphereLight glowing(const Eigen::Vector3d& at, double glow, const Seen& seen) {
 
 TEST(Glares, TakesSkyAllAroundThatIsBrighterBesideTheSpot) {
   const Eigen::Vector3d at = sun_direction({120, 35});
-  const FoundSun spot{at, 10, true, 3};
+  const FoundSun spot{at, 10, 1, true, 3};
   const auto all = [](const Eigen::Vector3d&) { return true; };
   const auto sky_where = [&](const auto& is_sky) {
     const SphereLight light = glowing(at, 5, all);

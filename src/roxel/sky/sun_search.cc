@@ -48,7 +48,7 @@ std::vector<int> clipped_patch(const SphereLight& light, int seed, bool (*clips)
 FoundSun sun_of_patch(const SphereLight& light, const std::vector<int>& patch) {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const int f : patch) middle += light.facets[f].bright;
-  FoundSun sun{middle.normalized(), 0, true, 0};
+  FoundSun sun{middle.normalized(), 0, 0, true, 0};
   for (const int f : patch)
     sun.radius_deg =
         std::max(sun.radius_deg,
@@ -56,10 +56,10 @@ FoundSun sun_of_patch(const SphereLight& light, const std::vector<int>& patch) {
   return sun;
 }
 
-/// All patches that are small enough to be the sun and its glare.
-void add_patches(const SphereLight& light, bool (*clips)(const FacetLight&),
-                 std::vector<std::pair<std::size_t, FoundSun>>& patches) {
+/// All patches that are small enough to be the sun and its glare, largest first.
+std::vector<FoundSun> clipped_patches(const SphereLight& light, bool (*clips)(const FacetLight&)) {
   std::vector<bool> seen(light.facets.size());
+  std::vector<std::pair<std::size_t, FoundSun>> patches;
   for (int f = 0; f < light.sphere->count(); ++f) {
     if (seen[f] || !clips(light.facets[f])) continue;
     const std::vector<int> patch = clipped_patch(light, f, clips, seen);
@@ -67,14 +67,6 @@ void add_patches(const SphereLight& light, bool (*clips)(const FacetLight&),
     if (sun.radius_deg <= kWidestPatchDeg && sun.direction.z() >= kLowestSunSine)
       patches.emplace_back(patch.size(), sun);
   }
-}
-
-/// Facets that clip altogether, where a few pixels may join the sun to a wall; and those that clip at all,
-/// which hold a small sun.
-std::vector<FoundSun> clipped_patches(const SphereLight& light) {
-  std::vector<std::pair<std::size_t, FoundSun>> patches;
-  add_patches(light, is_clipped, patches);
-  add_patches(light, holds_clipped, patches);
   std::stable_sort(patches.begin(), patches.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<FoundSun> sorted;
@@ -95,8 +87,12 @@ std::vector<FoundSun> bright_spots(const SphereLight& light) {
   const double peak = light.facets[brightest].peak;
   const double contrast = median > 0 ? peak / median : 0;
   std::vector<FoundSun> spots;
-  if (light.facets[brightest].clipped > 0) spots = clipped_patches(light);
-  for (FoundSun& spot : spots) spot.contrast = contrast;
+  if (light.facets[brightest].clipped > 0) {
+    spots = clipped_patches(light, is_clipped);
+    const std::vector<FoundSun> small = clipped_patches(light, holds_clipped);
+    spots.insert(spots.end(), small.begin(), small.end());
+  }
+  for (FoundSun& spot : spots) spot.contrast = contrast, spot.peak = peak;
   if (!(contrast >= kLeastContrast)) return spots;
   // The facet's own middle of light first, then all light around it.
   const Eigen::Vector3d start = light.facets[brightest].bright.normalized();
@@ -105,7 +101,7 @@ std::vector<FoundSun> bright_spots(const SphereLight& light) {
     if (light.facets[f].peak > 0.05 * peak &&
         light.sphere->centre(f).dot(start) > std::cos(kClusterDeg * kDegree))
       middle += light.facets[f].bright;
-  spots.push_back({middle.normalized(), contrast, light.facets[brightest].clipped > 0, kClusterDeg});
+  spots.push_back({middle.normalized(), contrast, peak, light.facets[brightest].clipped > 0, kClusterDeg});
   return spots;
 }
 

@@ -10,15 +10,16 @@ namespace roxel {
 
 struct FoundSun {
   Eigen::Vector3d direction;  ///< unit, sky frame
-  double contrast = 0;    ///< its peak over the median luminance above the horizon; clipped: a lower bound
+  double contrast = 0;    ///< the peak over the median luminance above the horizon; clipped: a lower bound
+  double peak = 0;        ///< highest luminance of all
   bool clipped = false;   ///< direction is the middle of a clipped patch
   double radius_deg = 0;  ///< of the patch or cluster: its farthest facet from the middle
 };
 
-/// The brightest cluster above the horizon, and if that clips, what may be the sun and its glare: all patches
-/// that clip, up to 20 degrees from their middle to their edge, largest first. Empty where nothing stands
-/// out: no such patch, and no pixel 12 times brighter than the median. Lamps, windows and sunlit walls are
-/// among them.
+/// What may be the sun: where the brightest facet clips, patches up to 20 degrees from their middle to their
+/// edge, of facets that clip for more than half, then of those that clip at all (a small sun, but also the
+/// sun and a wall together), each largest first; then the brightest cluster above the horizon, if it is 12
+/// times brighter than the median. Lamps, windows and sunlit walls are among them.
 std::vector<FoundSun> bright_spots(const SphereLight& light);
 
 /// Part of the sphere, from one distance to another around a direction.
