@@ -21,7 +21,7 @@ OptionTable<StageSwitches> make_stage_table() {
       .placeholder("AZ,EL")
       .unit("degrees")
       .range(-360, 360)
-      .unset("from time and place, else the brightest spot");
+      .unset("from time and place, else a bright spot that is surely the sun");
   table.add("sky-masks", &StageSwitches::sky_masks)
       .help("Folder of masks NAME.png by hand, 255 = sky, for skies that are fitted anew")
       .placeholder("DIR")

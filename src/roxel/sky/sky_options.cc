@@ -11,7 +11,7 @@ OptionTable<SkyOptions> make_table() {
       .placeholder("AZ,EL")
       .unit("degrees")
       .range(-360, 360)
-      .unset("from time and place, else the brightest spot");
+      .unset("from time and place, else a bright spot that is surely the sun");
   table.add("up", &SkyOptions::up)
       .help("Which way the world's zenith is")
       .placeholder("X,Y,Z")
