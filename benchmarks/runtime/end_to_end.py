@@ -5,7 +5,7 @@
 
 Makes a synthetic head on a turntable with N, 2 N and 4 N photographs, and runs `roxel reconstruct` on it with all that it does by default,
 or with OPTIONS. Prints wall and processor time, peak memory beside what `roxel info` announced, live voxels, exponents fitted in the logarithm,
-bytes a live voxel, and the speed-up by a second thread. The machine should have nothing else to do; of several runs (--repeat) the fastest counts.
+and the speed-up by a second thread. The machine should have nothing else to do; of several runs (--repeat) the fastest counts.
 """
 
 import argparse
@@ -46,11 +46,6 @@ def exponent(sizes, costs):
     xs, ys = [math.log(s) for s in sizes], [math.log(c) for c in costs]
     mx, my = sum(xs) / len(xs), sum(ys) / len(ys)
     return sum((x - mx) * (y - my) for x, y in zip(xs, ys)) / sum((x - mx) ** 2 for x in xs)
-
-
-def slope(sizes, costs):
-    mx, my = sum(sizes) / len(sizes), sum(costs) / len(costs)
-    return sum((x - mx) * (y - my) for x, y in zip(sizes, costs)) / sum((x - mx) ** 2 for x in sizes)
 
 
 class Bench:
@@ -118,7 +113,7 @@ def main():
     for side, cost in zip(sides, by_side): row(side, cost)
     voxels = [c.voxels for c in by_side]
     print(f"exponent in voxels: processor time {exponent(voxels, [c.cpu for c in by_side]):.2f}, wall time "
-          f"{exponent(voxels, [c.wall for c in by_side]):.2f}; peak memory grows by {slope(voxels, [c.peak for c in by_side]):.0f} bytes a live voxel")
+          f"{exponent(voxels, [c.wall for c in by_side]):.2f}")
 
     head("threads")
     by_threads = [bench.run(2 * n, options.resolution, count) for count in (1, 2)]
