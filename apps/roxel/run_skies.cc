@@ -10,13 +10,12 @@ namespace {
 /// Whether all photographs say when and where they were taken, and some are more than a quarter of an hour
 /// apart.
 bool several_times_of_day(const Dataset& dataset) {
-  constexpr double kSameLight_s = 900;
   double first = std::numeric_limits<double>::infinity(), last = -first;
   for (const View& view : dataset.views) {
     if (!view.time_utc_s || !view.latitude_deg || !view.longitude_deg) return false;
     first = std::min(first, *view.time_utc_s), last = std::max(last, *view.time_utc_s);
   }
-  return last - first > kSameLight_s;
+  return last - first > kSameSky_s;
 }
 
 }  // namespace

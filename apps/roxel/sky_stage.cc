@@ -45,7 +45,6 @@ void check_places(const std::vector<NodeSky>& skies, const fs::path& run, const 
 /// Photographs that no sky was fitted to have that of their node, where its others have but one, unless their
 /// time says otherwise.
 void give_nodes_their_sky(const Dataset& dataset, Daylight& daylight) {
-  constexpr double kSameLight_s = 900;
   for (const Node& node : dataset.nodes) {
     std::set<int> known;
     for (const int v : node.view_idxs)
@@ -54,7 +53,7 @@ void give_nodes_their_sky(const Dataset& dataset, Daylight& daylight) {
     const std::optional<double>& time = daylight.skies[*known.begin()].time_utc_s;
     for (const int v : node.view_idxs) {
       const std::optional<double>& own = dataset.views[v].time_utc_s;
-      if (!time || !own || std::abs(*own - *time) <= kSameLight_s) daylight.sky_of_views[v] = *known.begin();
+      if (!time || !own || std::abs(*own - *time) <= kSameSky_s) daylight.sky_of_views[v] = *known.begin();
     }
   }
 }

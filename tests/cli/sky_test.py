@@ -593,6 +593,14 @@ class LightInReconstruct(SkyCase):
         self.assertEqual([emptied for _, emptied in found.values()], [True, False, False])
         self.assertNotEqual(found["emptied"][0], found["left"][0])
 
+    def test_photographs_without_a_sky_share_their_node_s(self):
+        some = self.folder / "some"
+        self.succeed("sky", self.street, "-o", some, "--images", "*_0[0-9]*", "--no-pictures", "--quiet")
+        _, summary = self.reconstruct("shared", "--sky", some)
+        self.assertLess(len(json.loads((some / "sky/n00.json").read_text())["views"]), sum("n00_" in v["name"] for v in summary["views"]))
+        self.assertEqual({len(lights) for lights in self.lights(summary).values()}, {1})
+        self.assertFalse([w for w in summary["warnings"] if "no sky fitted" in w])
+
     def test_skies_of_other_photographs_of_the_same_names_are_refused(self):
         data = json.loads((self.street / "transforms.json").read_text())
         frame = next(f for f in data["frames"] if "n01_03" in f["file_path"])

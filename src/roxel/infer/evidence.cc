@@ -123,11 +123,14 @@ ROXEL_KERNEL void add_opacities(const VoxelScratch* voxels, std::uint32_t count,
   }
 }
 
-ROXEL_KERNEL void make_color(const ColorTotals& totals, VoxelColor& color) {
+/// The totals' colour, to ten numbers in the order of VoxelColor and VoxelScratch.
+inline __attribute__((always_inline)) void look_up(const ColorTotals& totals, float color[10]) {
   EightTotals sums;
   load(totals.data() + 1, sums);
-  color_of_sums(totals[0], sums, totals[9], color.mean);
+  color_of_sums(totals[0], sums, totals[9], color);
 }
+
+ROXEL_KERNEL void make_color(const ColorTotals& totals, VoxelColor& color) { look_up(totals, color.mean); }
 
 /// Makes a voxel hold what the other nodes say: the totals less its own sums.
 inline __attribute__((always_inline)) void leave_out(const ColorTotals& totals, VoxelScratch& voxel) {
@@ -138,20 +141,13 @@ inline __attribute__((always_inline)) void leave_out(const ColorTotals& totals, 
   color_of_sums(totals[0] - own.weight, sums - own.sums, totals[9] - own.yz, voxel.mean);
 }
 
-/// Makes a voxel hold the totals' colour.
-inline __attribute__((always_inline)) void look_up(const ColorTotals& totals, VoxelScratch& voxel) {
-  EightTotals sums;
-  load(totals.data() + 1, sums);
-  color_of_sums(totals[0], sums, totals[9], voxel.mean);
-}
-
 /// Voxels with a node's own sums get what the others say, and no opacity sums.
 ROXEL_KERNEL void leave_out_own(const ColorTotals* totals, std::uint32_t count, VoxelScratch* voxels) {
   for (std::uint32_t i = 0; i < count; ++i) {
     if (voxels[i].evidence > 0)
       leave_out(totals[i], voxels[i]);
     else
-      look_up(totals[i], voxels[i]);
+      look_up(totals[i], voxels[i].mean);
     voxels[i].hits = voxels[i].exposure = voxels[i].looked = 0;
   }
 }
@@ -166,7 +162,7 @@ ROXEL_KERNEL void set_up(const float* tau, const ColorTotals* totals, std::uint3
     const Floats low{}, high = {0, 0, tau[i]};
     store(low, voxels[i].mean);
     store(high, voxels[i].mean + kLanes);
-    if (totals) look_up(totals[i], voxels[i]);
+    if (totals) look_up(totals[i], voxels[i].mean);
   }
 }
 
@@ -189,7 +185,7 @@ ROXEL_KERNEL void set_up_others(const float* tau, const ColorTotals* totals, std
     if (has_own)
       leave_out(totals[i], voxels[i]);
     else
-      look_up(totals[i], voxels[i]);
+      look_up(totals[i], voxels[i].mean);
   }
 }
 

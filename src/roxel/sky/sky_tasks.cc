@@ -13,7 +13,6 @@
 namespace roxel {
 namespace {
 
-constexpr double kSameSky_s = 900;
 constexpr double kSamePlace_deg = 0.01;  ///< a kilometre: what coordinates of one place may differ by
 constexpr double kApart =
     10;  ///< two groups of cameras this many times as far apart as either is wide are two

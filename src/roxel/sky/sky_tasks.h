@@ -11,6 +11,9 @@
 
 namespace roxel {
 
+/// Photographs that were taken farther apart in time than this, in seconds, are in different light.
+inline constexpr double kSameSky_s = 900;
+
 struct DatasetSkies {
   std::vector<SkyTask> tasks;               ///< views by name; tasks have different names
   std::vector<std::vector<int>> view_idxs;  ///< of each task, as SkyTask::views

@@ -160,6 +160,43 @@ NodeSky dome_of(int view) {
   return sky;
 }
 
+// Pairs of photographs from one place, the second in twice the light: each is painted by its own sky.
+TEST(PaintByNormal, ANodeMayHaveSeveralSkies) {
+  const Dataset apart = cube_dataset(12, 32);
+  Dataset pairs = apart;
+  pairs.nodes.assign(6, {});
+  for (int v = 0; v < 12; ++v) {
+    pairs.views[v].node_idx = v / 2;
+    pairs.nodes[v / 2].centre = apart.views[v].camera.pose.centre;
+    pairs.nodes[v / 2].view_idxs.push_back(v);
+  }
+  Daylight daylight;
+  for (int v = 0; v < 12; ++v) {
+    NodeSky& sky = daylight.skies.emplace_back();
+    sky.model = SkyModel::kUniform;
+    sky.sun_source = SunSource::kTime;
+    for (PerezChannel& channel : sky.channels) channel.scale = v % 2 == 0 ? 1 : 2;
+    daylight.sky_of_views.push_back(v);
+  }
+  const auto painted = [&](const Dataset& dataset) {
+    const PhotographLoader load =
+        [&, plain = fixture::cube_loader(std::array<float, 3>{0, 0, 0}, true)](const View& view) {
+          Photograph photo = plain(view);
+          if ((&view - dataset.views.data()) % 2 == 1)
+            for (float& value : photo.rgb.data()) value *= 2;
+          return photo;
+        };
+    ReconstructOptions options = cube_options(IlluminationChoice::kSkyNormal, Matching::kCanonical);
+    options.levels = 1;
+    options.fit_colors = false;
+    RunContext context(2);
+    ReconstructHooks hooks;
+    hooks.daylight = &daylight;
+    return mean_log_color(reconstruct(dataset, load, options, context, hooks));
+  };
+  EXPECT_NEAR(painted(pairs), painted(apart), 0.1);
+}
+
 // Two of three views have the light of their dome; the others are five times darker, and follow the volume.
 TEST(FitGains, ViewsWithoutASkyAreHeldToTheScaleOfThoseWithOne) {
   const Dataset dataset = cube_dataset(15, 48);
