@@ -32,7 +32,7 @@ option(ROXEL_PRECOMPILED_HEADERS "Parse common headers once" ${ROXEL_PRECOMPILED
 # namespaces must thus be unique within a module. The dev preset has it off: there one file is built at a time.
 option(ROXEL_UNITY_BUILD "Compile several files of a module as one" ${ROXEL_PRECOMPILED_HEADERS_DEFAULT})
 set(CMAKE_UNITY_BUILD ${ROXEL_UNITY_BUILD})
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)
 
 # roxel_precompile(TARGET OWNER HEADER ...): TARGET uses OWNER's precompiled headers, OWNER's own are made.
 function(roxel_precompile target owner)

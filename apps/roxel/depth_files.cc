@@ -97,7 +97,7 @@ Image opacity_of(const DepthLayers& layers, const Image& depth) {
 }
 
 /// The best that is known of the depth.
-void write_picture(const fs::path& results, const View& view, const DepthLayers& layers) {
+void write_depth_picture(const fs::path& results, const View& view, const DepthLayers& layers) {
   const Image depth = best_estimates(layers).depth;
   const Image shown = opacity_of(layers, depth);
   write_png(view_path(results, "depth", view.name, ".png").string(),
@@ -137,7 +137,7 @@ DepthStageFigures refine_depth_files(const Dataset& dataset, const PhotographLoa
   files.write = [&](int v, const DepthLayers& layers) {
     if (options.refine && layers.depth_refined.empty()) return aside.keep(v, layers);
     write_depth(depth_path(results, dataset.views[v].name), layers);
-    write_picture(results, dataset.views[v], layers);
+    write_depth_picture(results, dataset.views[v], layers);
   };
   files.keep = [&](int v, const RefinedView& view) { aside.keep(v, view); };
   files.recall = [&](int v) { return aside.recall(v); };

@@ -7,7 +7,7 @@
 namespace roxel {
 namespace {
 
-constexpr int kSide = 100;  ///< pixels
+constexpr int kPhotoSide = 100;  ///< pixels
 
 /// Masks of both views of one node.
 const std::vector<std::uint8_t> kFirst = {1, 1, 0, 0}, kSecond = {0, 0, 1, 1};
@@ -35,7 +35,7 @@ Dataset four_cameras() {
   for (int v = 0; v < 4; ++v) {
     View view;
     view.name = std::to_string(v);
-    view.camera.intrinsics = {kSide, kSide, 100, 100, 50, 50, 0};
+    view.camera.intrinsics = {kPhotoSide, kPhotoSide, 100, 100, 50, 50, 0};
     view.camera.pose.centre = {v < 2 ? 0.0 : 0.4, 0, -4};
     dataset.views.push_back(view);
   }
@@ -48,11 +48,11 @@ Dataset four_cameras() {
 /// Above row `horizon` all is sky, but for one pixel at (70, 10).
 Photograph sky_above(int horizon) {
   Photograph photo;
-  photo.rgb = Image(kSide, kSide, 3);
-  photo.foreground = Mask(kSide, kSide);
-  photo.sky = Mask(kSide, kSide, 0);
+  photo.rgb = Image(kPhotoSide, kPhotoSide, 3);
+  photo.foreground = Mask(kPhotoSide, kPhotoSide);
+  photo.sky = Mask(kPhotoSide, kPhotoSide, 0);
   for (int y = 0; y < horizon; ++y)
-    for (int x = 0; x < kSide; ++x) photo.sky.at(x, y) = 252;
+    for (int x = 0; x < kPhotoSide; ++x) photo.sky.at(x, y) = 252;
   photo.sky.at(70, 10) = 55;
   return photo;
 }
@@ -88,14 +88,14 @@ TEST(CarveSky, EmptiesWhatAPhotographShowsAsSkyAlone) {
 }
 
 TEST(CarveSky, LeavesWhatIsPartlyOutsideTheImage) {
-  const Volume volume = carved(kSide, kFirst);
+  const Volume volume = carved(kPhotoSide, kFirst);
   EXPECT_EQ(tau_at(volume, {0.05, 0.05, -1.15}), 0);
   EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.15}), 0);  // row 10
   EXPECT_EQ(tau_at(full_volume(), {0.05, 0.05, 0}), 0.5f);
   const Dataset dataset = four_cameras();
   for (const double x : {-1.15, 1.15}) {
     // Column 50 + 100 x / z: at -1.15 of the second camera that is 50 - 155 / 2.85, outside.
-    const Volume by_second = carved(kSide, kSecond);
+    const Volume by_second = carved(kPhotoSide, kSecond);
     EXPECT_EQ(tau_at(by_second, {x, 0.05, -1.15}), x < 0 ? 0.5f : 0.0f);
   }
 }
@@ -103,8 +103,8 @@ TEST(CarveSky, LeavesWhatIsPartlyOutsideTheImage) {
 TEST(CarveSky, LeavesWhatTheLensDoesNotReach) {
   const auto load = [](const View&) {
     Photograph photo = sky_above(50);
-    photo.valid = Mask(kSide, kSide);
-    for (int x = 0; x < kSide; ++x) photo.valid.at(x, 20) = 0;
+    photo.valid = Mask(kPhotoSide, kPhotoSide);
+    for (int x = 0; x < kPhotoSide; ++x) photo.valid.at(x, 20) = 0;
     return photo;
   };
   Volume volume = full_volume();
@@ -142,7 +142,7 @@ TEST(CarveSky, OneIsEnoughForHaze) {
 TEST(CarveSky, AsksMasksOfTheSkyAlone) {
   const auto load = [](const View&) {
     Photograph photo = sky_above(50);
-    photo.foreground = Mask(kSide, kSide, 0);  // no object anywhere
+    photo.foreground = Mask(kPhotoSide, kPhotoSide, 0);  // no object anywhere
     return photo;
   };
   Volume volume = full_volume();
