@@ -69,7 +69,7 @@ TEST(RunPass, OneOpaqueVoxelSeenTwiceIsFoundExactly) {
   const std::uint32_t slot = fixture::slot_at(volume, 3, 4, 4);
   EXPECT_NEAR(alpha_from_tau(volume.tau[slot]), 1, 1e-3);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(volume.color_mean[slot][c], kObject[c], 1e-3);
-  for (int c = 0; c < 6; ++c) EXPECT_NEAR(volume.color_cov[slot][c], 0, 1e-2);
+  for (int c = 0; c < 6; ++c) EXPECT_NEAR(volume.color_cov[slot].unpacked()[c], 0, 1e-2);
   // What rays of both cameras cross stands before or behind it; only its silhouette's edge may keep a little.
   int others = 0;
   for (std::uint32_t s = 0; s < volume.slot_count(); ++s)

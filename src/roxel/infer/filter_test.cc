@@ -180,7 +180,7 @@ class TwoColoredVoxels : public TwoVoxelRay {
     for (int i = 0; i < 2; ++i) {
       volume_.color_weight[i] = 1;
       for (int c = 0; c < 3; ++c) volume_.color_mean[i][c] = static_cast<float>(colors_[i][c]);
-      volume_.color_cov[i] = {9, 9, 9, 0, 0, 0};
+      volume_.color_cov[i] = PackedCovariance({9, 9, 9, 0, 0, 0});
     }
     const SampleView view = view_of(camera_, image, plan_of({1, 100}, 0));
     const LatticeStack stack(volume_);
@@ -217,7 +217,7 @@ TEST(FilteredColors, StayNumbersBehindManyVoxelsOfOtherColours) {
     volume.tau[slot] = 2.2f;  // opacity 0.89, just below the limit
     volume.color_weight[slot] = 1;
     volume.color_mean[slot] = {20, -30, 40};
-    volume.color_cov[slot] = {9, 9, 9, 0, 0, 0};
+    volume.color_cov[slot] = PackedCovariance({9, 9, 9, 0, 0, 0});
   }
   for (const UpdateRule rule : {UpdateRule::kPosterior, UpdateRule::kRoxels}) {
     const SampleView view = view_of(camera_at({-20, 4.5, 4.5}, {4.5, 4.5, 4.5}, 1, 10),

@@ -32,7 +32,7 @@ void FilteredColorMarch::deposit(const SampleView& view, const Region& region, c
     const float share = (everywhere_ ? 1 : a * transmittance) * chunk.weight[i] * weight;
     if (share >= kLeastColorWeight) add_sample(seen, share, voxel);
     if (options_.filters.rays && !everywhere_ && volume.color_weight[slot] > 0)
-      removed.remove(a, volume.color_mean[slot].data(), volume.color_cov[slot].data(),
+      removed.remove(a, volume.color_mean[slot].data(), volume.color_cov[slot].unpacked().data(),
                      options_.filters.limit);
     transmittance *= 1 - a;
     ++counts.steps;

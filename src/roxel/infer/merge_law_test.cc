@@ -89,7 +89,9 @@ TEST_P(MergeLaw, TwoPassesMergedAreOneJointPass) {
     ASSERT_NEAR(merged.color_weight[s], joint.color_weight[s], 1e-5);
     if (joint.color_weight[s] > 1e-3f) {
       for (int c = 0; c < 3; ++c) ASSERT_NEAR(merged.color_mean[s][c], joint.color_mean[s][c], 1e-3);
-      for (int c = 0; c < 6; ++c) ASSERT_NEAR(merged.color_cov[s][c], joint.color_cov[s][c], 0.02);
+      const std::array<float, 6> once = merged.color_cov[s].unpacked(), at_once = joint.color_cov[s].unpacked();
+      const float spread = std::max({at_once[0], at_once[1], at_once[2]});
+      for (int c = 0; c < 6; ++c) ASSERT_NEAR(once[c], at_once[c], 0.02 + 4e-3 * spread);
     }
     moved += std::abs(joint.tau[s] - first.tau[s]) > 0.01f * joint.tau[s];
     in_both += first.color_weight[s] > 0 && second.color_weight[s] > 0;

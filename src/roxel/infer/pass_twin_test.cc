@@ -39,8 +39,9 @@ Difference difference(const Volume& volume, const PassTwin& twin) {
     const Eigen::Vector3d mean = expected.color.mean();
     const Eigen::Matrix3d cov = expected.color.cov();
     for (int c = 0; c < 3; ++c) raise(most.mean, volume.color_mean[slot][c], mean[c]);
+    const std::array<float, 6> kept = volume.color_cov[slot].unpacked();
     const double expected_cov[6] = {cov(0, 0), cov(1, 1), cov(2, 2), cov(0, 1), cov(0, 2), cov(1, 2)};
-    for (int c = 0; c < 6; ++c) raise(most.cov, volume.color_cov[slot][c], expected_cov[c]);
+    for (int c = 0; c < 6; ++c) raise(most.cov, kept[c], expected_cov[c]);
   }
   return most;
 }

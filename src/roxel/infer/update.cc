@@ -135,7 +135,7 @@ void update_color(const std::vector<ColorTotals>& totals, int threads, Volume& v
       const VoxelColor color = color_of(totals[slot]);
       if (color.evidence <= 0) continue;
       std::copy(color.mean, color.mean + 3, volume.color_mean[slot].begin());
-      std::copy(color.cov, color.cov + 6, volume.color_cov[slot].begin());
+      volume.color_cov[slot] = PackedCovariance(std::to_array(color.cov));
       volume.color_weight[slot] = color.evidence;
     }
   });

@@ -32,7 +32,7 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr std::string_view kMagic = "roxel checkpoint\n";
-constexpr std::uint32_t kCheckpointFormat = 2;
+constexpr std::uint32_t kCheckpointFormat = 3;
 
 /// What is wrong with a file: the reader goes on to the one before.
 struct Damaged {

@@ -30,7 +30,9 @@ Volume some_volume(float seed) {
     for (float* value : {&volume.tau[slot], &volume.confidence[slot], &volume.color_weight[slot]})
       fill(*value);
     for (float& value : volume.color_mean[slot]) fill(value);
-    for (float& value : volume.color_cov[slot]) fill(value);
+    std::array<float, 6> cov;
+    for (float& value : cov) fill(value);
+    volume.color_cov[slot] = PackedCovariance(cov);
     for (float& value : volume.support[slot]) fill(value);
   }
   return volume;

@@ -71,8 +71,8 @@ std::vector<std::pair<std::string, GridBase::Ptr>> channel_grids(const Volume& v
       {"confidence", scalar([&](auto s) { return v.confidence[s]; })},
       {"optical_depth", scalar([&](auto s) { return v.tau[s]; })},
       {"color_mean", vector([&](auto s) { return Vec3f(v.color_mean[s].data()); })},
-      {"color_cov_diag", vector([&](auto s) { return Vec3f(v.color_cov[s].data()); })},
-      {"color_cov_off", vector([&](auto s) { return Vec3f(v.color_cov[s].data() + 3); })},
+      {"color_cov_diag", vector([&](auto s) { return Vec3f(v.color_cov[s].unpacked().data()); })},
+      {"color_cov_off", vector([&](auto s) { return Vec3f(v.color_cov[s].unpacked().data() + 3); })},
       {"support", vector([&](auto s) { return Vec3f(v.color_weight[s], v.support[s][0], v.support[s][1]); })},
   };
 }
@@ -248,9 +248,11 @@ void fill_lattice(const Archive& archive, int lattice, Volume& v) {
   if (!v.fitted_color.empty())
     vector("color", [&](auto s, const Vec3f& x) { v.fitted_color[s] = {x[0], x[1], x[2]}; });
   vector("color_cov_diag",
-         [&](auto s, const Vec3f& x) { std::copy_n(x.asPointer(), 3, v.color_cov[s].data()); });
-  vector("color_cov_off",
-         [&](auto s, const Vec3f& x) { std::copy_n(x.asPointer(), 3, v.color_cov[s].data() + 3); });
+         [&](auto s, const Vec3f& x) { v.color_cov[s] = PackedCovariance({x[0], x[1], x[2], 0, 0, 0}); });
+  vector("color_cov_off", [&](auto s, const Vec3f& x) {
+    const std::array<float, 6> cov = v.color_cov[s].unpacked();
+    v.color_cov[s] = PackedCovariance({cov[0], cov[1], cov[2], x[0], x[1], x[2]});
+  });
   vector("support", [&](auto s, const Vec3f& x) {
     v.color_weight[s] = x[0];
     v.support[s] = {x[1], x[2]};

@@ -55,7 +55,8 @@ Volume random_volume(int voxels = 3000) {
     volume.confidence[s] = unit(random);
     volume.color_weight[s] = 10 * unit(random);
     volume.color_mean[s] = {100 * unit(random), 100 * unit(random) - 50, 100 * unit(random) - 50};
-    for (float& c : volume.color_cov[s]) c = unit(random);
+    const float x = unit(random), y = unit(random), z = unit(random);
+    volume.color_cov[s] = PackedCovariance({x, y, z, 0.9f * std::sqrt(x * y), -0.3f * std::sqrt(x * z), 0});
     volume.support[s] = {unit(random), 1e6f * unit(random)};
   }
   return volume;

@@ -35,7 +35,7 @@ constexpr double kLoadPixelNs = 60;
 constexpr double kDraftCost = 0.45;  ///< of a pass on all samples
 
 // Bytes a voxel: channels of the volume, totals of a pass, and a worker's scratch.
-constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 24 + 8 + 12;
+constexpr double kChannelBytes = 4 + 4 + 4 + 12 + 12 + 8 + 12;
 constexpr double kTotalsBytes = 80 + 24 + 8;
 constexpr double kScratchBytes = 64;
 constexpr double kKeptShare = 0.6;  ///< of the voxels, for each node

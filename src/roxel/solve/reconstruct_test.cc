@@ -552,7 +552,7 @@ Volume brick_of(double s, const Eigen::Vector3i& bricks) {
     volume.confidence[slot] = 0.5f;
     volume.color_weight[slot] = 2 + slot;
     volume.color_mean[slot] = {1.0f * slot, 2, 3};
-    volume.color_cov[slot] = {4, 5, 6, 1.0f * slot, 0, 1};
+    volume.color_cov[slot] = PackedCovariance({4, 5.0f + slot, 6, 1, 0, 1});
   }
   return volume;
 }

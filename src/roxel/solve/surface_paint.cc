@@ -226,7 +226,8 @@ void put(const Spread& spread, const ColorTransform& transform, std::uint32_t sl
       spread.cov[3], spread.cov[1], spread.cov[5],     //
       spread.cov[4], spread.cov[5], spread.cov[2];
   cov = jacobian * cov * jacobian.transpose();
-  volume.color_cov[slot] = {cov(0, 0), cov(1, 1), cov(2, 2), cov(0, 1), cov(0, 2), cov(1, 2)};
+  volume.color_cov[slot] =
+      PackedCovariance({cov(0, 0), cov(1, 1), cov(2, 2), cov(0, 1), cov(0, 2), cov(1, 2)});
   volume.color_weight[slot] = spread.weight;
 }
 

@@ -129,18 +129,19 @@ class Evidence {
     const auto& mu = v.color_mean[slot];
     weight_ += w;
     for (int i = 0; i < 3; ++i) mean_[i] += w * mu[i];
+    const std::array<float, 6> cov = v.color_cov[slot].unpacked();
     for (int c = 0; c < 6; ++c)
-      moment_[c] += w * (v.color_cov[slot][c] + static_cast<double>(mu[kRow[c]]) * mu[kColumn[c]]);
+      moment_[c] += w * (cov[c] + static_cast<double>(mu[kRow[c]]) * mu[kColumn[c]]);
   }
 
   void store_color(Volume& v, std::uint32_t slot) const {
     v.color_weight[slot] = static_cast<float>(weight_);
     double mu[3];
     for (int i = 0; i < 3; ++i) v.color_mean[slot][i] = static_cast<float>(mu[i] = mean_[i] / weight_);
-    for (int c = 0; c < 6; ++c) {
-      const double cov = moment_[c] / weight_ - mu[kRow[c]] * mu[kColumn[c]];
-      v.color_cov[slot][c] = static_cast<float>(c < 3 ? std::max(0.0, cov) : cov);
-    }
+    std::array<float, 6> cov;
+    for (int c = 0; c < 6; ++c)
+      cov[c] = static_cast<float>(moment_[c] / weight_ - mu[kRow[c]] * mu[kColumn[c]]);
+    v.color_cov[slot] = PackedCovariance(cov);
   }
 
   // Solves the update rule for the prior that, with this volume's support, gave its tau.

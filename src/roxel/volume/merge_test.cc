@@ -48,9 +48,8 @@ Volume accumulated(const std::vector<Observation>& observations, const std::vect
     volume.confidence[s] = static_cast<float>(n / (n + 2));
     volume.color_weight[s] = static_cast<float>(w);
     for (int c = 0; c < 3; ++c) volume.color_mean[s][c] = static_cast<float>(mu[c]);
-    volume.color_cov[s] = {static_cast<float>(cov(0, 0)), static_cast<float>(cov(1, 1)),
-                           static_cast<float>(cov(2, 2)), static_cast<float>(cov(0, 1)),
-                           static_cast<float>(cov(0, 2)), static_cast<float>(cov(1, 2))};
+    const Eigen::Matrix3f c = cov.cast<float>();
+    volume.color_cov[s] = PackedCovariance({c(0, 0), c(1, 1), c(2, 2), c(0, 1), c(0, 2), c(1, 2)});
     volume.support[s] = {static_cast<float>(r), static_cast<float>(exposure)};
   }
   return volume;
@@ -78,8 +77,10 @@ void expect_near(const Volume& a, const Volume& b) {
     EXPECT_NEAR(a.support[s][0], b.support[s][0], 1e-5);
     EXPECT_NEAR(a.support[s][1], b.support[s][1], 1e-5);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(a.color_mean[s][c], b.color_mean[s][c], 1e-4);
-    // Rounding of the two inputs: a covariance is a difference of squares of about 100^2 * 2^-24.
-    for (int c = 0; c < 6; ++c) EXPECT_NEAR(a.color_cov[s][c], b.color_cov[s][c], 5e-3);
+    // Both are rounded to three digits, and so were the parts of one of them.
+    const std::array<float, 6> one = a.color_cov[s].unpacked(), other = b.color_cov[s].unpacked();
+    const float spread = std::max({one[0], one[1], one[2]});
+    for (int c = 0; c < 6; ++c) EXPECT_NEAR(one[c], other[c], 5e-3 + 3e-3 * spread);
   }
 }
 
@@ -128,7 +129,7 @@ Volume painted(const Topology& topology, float salt) {
     volume.confidence[s] = 1 - 1 / (1 + x);
     volume.color_weight[s] = x;
     volume.color_mean[s] = {x, x + 1, x + 2};
-    volume.color_cov[s] = {x, x, x, 1, 2, 3};
+    volume.color_cov[s] = PackedCovariance({x, x, x, 1, 2, 3});
     volume.support[s] = {x, 2 * x};
   }
   return volume;

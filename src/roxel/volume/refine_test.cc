@@ -17,7 +17,7 @@ void paint(Volume& volume, std::uint32_t slot, float alpha) {
   volume.confidence[slot] = 0.5f;
   volume.color_weight[slot] = 3.0f + slot;
   volume.color_mean[slot] = {1.0f + slot, 2, 3};
-  volume.color_cov[slot] = {1, 2, 3, 4, 5.0f + slot, 6};
+  volume.color_cov[slot] = PackedCovariance({1, 2, 3.0f + slot, 0.4f, 0.5f, 0.6f});
   volume.support[slot] = {7, 8};
 }
 

@@ -27,6 +27,8 @@
 #include <span>
 #include <vector>
 
+#include "roxel/volume/packed_covariance.h"
+
 namespace roxel {
 
 inline constexpr int kBrickSide = 8;
@@ -191,7 +193,7 @@ class Volume {
   std::vector<float> confidence;                 ///< n / (n + 2), in [0, 1)
   std::vector<float> color_weight;               ///< summed weight of the colour, w
   std::vector<std::array<float, 3>> color_mean;  ///< in the matching colour space
-  std::vector<std::array<float, 6>> color_cov;   ///< xx, yy, zz, xy, xz, yz
+  std::vector<PackedCovariance> color_cov;       ///< of the same
   std::vector<std::array<float, 2>>
       support;  ///< evidence of the last opacity pass: sum r, and exposure (denominator)
 
