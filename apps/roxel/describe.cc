@@ -102,6 +102,8 @@ std::string memory_row(const MemoryPlan& plan) {
   std::string text = "about " + memory_text(plan.peak_bytes);
   if (std::isfinite(plan.sample_bytes))
     text += ", where all but " + memory_text(plan.sample_bytes) + " of samples are made anew in each pass";
+  if (plan.workers < std::numeric_limits<int>::max())
+    text += formatted(", and passes run on %d %s", plan.workers, plan.workers == 1 ? "thread" : "threads");
   return text;
 }
 

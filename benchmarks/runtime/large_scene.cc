@@ -21,7 +21,8 @@ namespace {
 constexpr double kGiB = 1 << 30;
 /// What is asked for before something is begun, in bytes a live voxel: what runs of this benchmark took, and
 /// a little more.
-constexpr double kBytesOfVolume = 75, kBytesOfPass = 330, kBytesOfTwoVolumes = 130;
+constexpr double kBytesOfVolume = 62, kBytesOfTwoVolumes = 106;
+constexpr double kBytesOfPass = 120;  ///< beside the volume and scratch
 
 double seconds_of(const std::function<void()>& work) {
   const auto start = std::chrono::steady_clock::now();
@@ -82,19 +83,26 @@ std::vector<SampleNode> few_small_views(const Volume& volume) {
   return make_nodes(volume, options);
 }
 
-/// Two passes: the first takes its memory from the system, the second finds it there.
+/// Two passes: the first takes its memory from the system, the second finds it there. As a run does, on as
+/// many threads, and with as many colours kept, as there is memory for.
 void measure_passes(int threads, Volume& volume, double before) {
   const double live = volume.slot_count();
   const std::vector<SampleNode> nodes = few_small_views(volume);
+  PassOptions options;
+  const double room = free_bytes() - kBytesOfPass * live;
+  options.most_workers =
+      std::clamp(static_cast<int>(room / (static_cast<double>(sizeof(VoxelScratch)) * live)), 1, threads);
+  const double scratch = static_cast<double>(sizeof(VoxelScratch)) * live * options.most_workers;
+  options.kept_color_bytes = static_cast<std::size_t>(
+      std::clamp(0.5 * (room - scratch), 0.0, static_cast<double>(options.kept_color_bytes)));
   PeakMemory peak;
   PassMemory memory;
   for (const char* which : {"first", "second"}) {
     PassReport report;
-    const double seconds = seconds_of([&] {
-      report = run_pass(nodes, PassOptions(), RunContext(threads), nullptr, volume, nullptr, &memory);
-    });
-    std::printf("%s pass, %zu views, %.2g steps, %d threads: %.2f s (colours %.2f, opacities %.2f)\n", which,
-                nodes.size(), static_cast<double>(report.opacity.steps), threads, seconds,
+    const double seconds = seconds_of(
+        [&] { report = run_pass(nodes, options, RunContext(threads), nullptr, volume, nullptr, &memory); });
+    std::printf("%s pass, %zu views, %.2g steps, %d workers: %.2f s (colours %.2f, opacities %.2f)\n", which,
+                nodes.size(), static_cast<double>(report.opacity.steps), options.most_workers, seconds,
                 report.color_seconds, report.opacity_seconds);
   }
   const double most = static_cast<double>(peak.bytes());
@@ -155,7 +163,7 @@ void large_scene(std::int64_t voxels, int threads) {
               (resident_bytes() - before) / static_cast<double>(live));
   std::fflush(stdout);
 
-  if (fits("passes", (kBytesOfPass - kBytesOfVolume) * static_cast<double>(live)))
+  if (fits("passes", (kBytesOfPass + sizeof(VoxelScratch)) * static_cast<double>(live)))
     measure_passes(threads, *volume, before);
   if (fits("prune", (kBytesOfTwoVolumes - kBytesOfVolume) * static_cast<double>(live))) {
     // Every second stretch of 64 voxels goes.

@@ -165,6 +165,9 @@ class OtherCommands(Case):
         self.assertIn("--voxel-size", self.expect_error(2, "--memory: found 0.30 GiB where about ", "reconstruct", self.data,
                                                         "-o", out, "--memory", "0.3", "--resolution", "512").stderr)
         self.assertFalse(out.exists())
+        eight = ["info", self.data, "--resolution", "256", "--threads", "8"]
+        ample = json.loads(self.succeed(*eight, "--json").stdout)["estimate"]["memory_bytes"]
+        self.assertRegex(self.succeed(*eight, "--memory", 0.8 * ample / 2**30).stdout, r"passes run on [1-7] threads?\n")
         said = self.succeed("info", self.data, "--memory", "0.3", "--resolution", "512")
         self.assertRegex(said.stdout, r"WARNING +memory: 0.30 GiB where about .* would fit")
 

@@ -89,7 +89,8 @@ TEST_P(MergeLaw, TwoPassesMergedAreOneJointPass) {
     ASSERT_NEAR(merged.color_weight[s], joint.color_weight[s], 1e-5);
     if (joint.color_weight[s] > 1e-3f) {
       for (int c = 0; c < 3; ++c) ASSERT_NEAR(merged.color_mean[s][c], joint.color_mean[s][c], 1e-3);
-      const std::array<float, 6> once = merged.color_cov[s].unpacked(), at_once = joint.color_cov[s].unpacked();
+      const std::array<float, 6> once = merged.color_cov[s].unpacked(),
+                                 at_once = joint.color_cov[s].unpacked();
       const float spread = std::max({at_once[0], at_once[1], at_once[2]});
       for (int c = 0; c < 6; ++c) ASSERT_NEAR(once[c], at_once[c], 0.02 + 4e-3 * spread);
     }

@@ -229,6 +229,31 @@ TEST(RunPass, KeepingOwnColorsChangesNoResult) {
   }
 }
 
+// A scratch is a worker's own: with fewer workers than threads there are fewer of them, and the same bits.
+TEST(RunPass, FewerWorkersThanThreadsChangeNoResult) {
+  std::mt19937 random(15);
+  const Volume start = random_volume({2, 2, 2}, 0.6, 0.01, 0.4, random);
+  const std::vector<SampleNode> nodes = nodes_around(start, 4, 24, 1, random);
+  const auto after = [&](int workers) {
+    Volume volume = start;
+    PassOptions options = calm();
+    options.most_workers = workers;
+    run_pass(nodes, options, RunContext(3), nullptr, volume);
+    return volume;
+  };
+  const Volume three = after(3);
+  for (const int workers : {1, 2}) {
+    const Volume fewer = after(workers);
+    EXPECT_EQ(fewer.tau, three.tau);
+    EXPECT_EQ(fewer.support, three.support);
+    EXPECT_EQ(fewer.color_cov, three.color_cov);
+  }
+  PassOptions options;
+  EXPECT_EQ(worker_count(options, RunContext(3)), 3);
+  options.most_workers = 2;
+  EXPECT_EQ(worker_count(options, RunContext(3)), 2);
+}
+
 // What passes leave in the memory that they share says nothing to the next one: whatever was kept, and with
 // other samples in between.
 TEST(RunPass, SharedMemoryChangesNoResult) {

@@ -44,13 +44,13 @@ PassCounts sum(const std::vector<PassCounts>& per_node) {
 }
 
 template <class Work>
-std::vector<PassCounts> for_each_node(const std::vector<SampleNode>& nodes, const RunContext& context,
-                                      const PassProgress& progress, double from, double to,
-                                      const Work& work) {
+std::vector<PassCounts> for_each_node(const std::vector<SampleNode>& nodes, int workers,
+                                      const RunContext& context, const PassProgress& progress, double from,
+                                      double to, const Work& work) {
   const std::vector<int> order = by_size(nodes);
   std::vector<PassCounts> counts(nodes.size());
   std::atomic<int> done{0};
-  parallel_for(nodes.size(), context.thread_count(), [&](std::int64_t i, int worker) {
+  parallel_for(nodes.size(), workers, [&](std::int64_t i, int worker) {
     context.throw_if_cancelled();
     counts[order[i]] = work(order[i], worker);
     if (progress) progress(from + (to - from) * (++done) / static_cast<double>(nodes.size()));
@@ -76,22 +76,24 @@ PassCounts collect_color(const LatticeStack& stack, const std::vector<SampleNode
                          CollectedColors& colors, PassMemory* memory) {
   PassMemory own_memory;
   PassMemory& used = memory ? *memory : own_memory;
-  used.set_workers(context.thread_count());
+  const int workers = worker_count(options, context);
+  used.set_workers(workers);
   colors.totals.clear_color();
   colors.kept.clear();
-  std::vector<double> march_seconds(context.thread_count(), 0.0);
-  const PassCounts counts = sum(for_each_node(nodes, context, progress, 0, 0.3, [&](int node, int worker) {
-    NodeScratch& scratch = used.scratch(worker, stack, stack.volume().tau);
-    const SampleNode views = resident(nodes[node]);
-    const double march_start = thread_seconds();
-    const PassCounts node_counts =
-        march_color(stack, views, options.opacity, options.everywhere, context, scratch);
-    march_seconds[worker] += thread_seconds() - march_start;
-    OwnColors* own = options.predictive ? colors.kept.room_for(node) : nullptr;
-    colors.totals.add_color(stack, scratch, own);
-    if (own) colors.kept.keep(node);
-    return node_counts;
-  }));
+  std::vector<double> march_seconds(workers, 0.0);
+  const PassCounts counts =
+      sum(for_each_node(nodes, workers, context, progress, 0, 0.3, [&](int node, int worker) {
+        NodeScratch& scratch = used.scratch(worker, stack, stack.volume().tau);
+        const SampleNode views = resident(nodes[node]);
+        const double march_start = thread_seconds();
+        const PassCounts node_counts =
+            march_color(stack, views, options.opacity, options.everywhere, context, scratch);
+        march_seconds[worker] += thread_seconds() - march_start;
+        OwnColors* own = options.predictive ? colors.kept.room_for(node) : nullptr;
+        colors.totals.add_color(stack, scratch, own);
+        if (own) colors.kept.keep(node);
+        return node_counts;
+      }));
   colors.march_cpu_seconds = std::accumulate(march_seconds.begin(), march_seconds.end(), 0.0);
   return counts;
 }
@@ -172,8 +174,9 @@ PassReport run_pass(const std::vector<SampleNode>& nodes, const PassOptions& opt
 
   start = Clock::now();
   totals.clear_opacity();
-  std::vector<double> march_seconds(context.thread_count(), 0.0);
-  report.opacity = sum(for_each_node(nodes, context, progress, 0.3, 1, [&](int node, int worker) {
+  const int workers = worker_count(options, context);
+  std::vector<double> march_seconds(workers, 0.0);
+  report.opacity = sum(for_each_node(nodes, workers, context, progress, 0.3, 1, [&](int node, int worker) {
     NodeScratch& scratch = used.scratch(worker, stack, volume.tau);
     const SampleNode views = resident(nodes[node]);
     compare_with_others(stack, views, node, options, colors, context, scratch);

@@ -1,7 +1,9 @@
 #pragma once
 /// One pass over all nodes: colours, then opacities (docs/passes.md).
 
+#include <algorithm>
 #include <atomic>
+#include <limits>
 
 #include "roxel/infer/update.h"
 
@@ -12,6 +14,8 @@ struct PassOptions {
   PriorOptions prior;
   bool predictive = true;  ///< leave a ray's own node out of the colour that it is compared with
   std::size_t kept_color_bytes = std::size_t{1} << 30;  ///< see KeptColors; changes no result
+  /// Threads that march at once, each with a scratch of 64 bytes a voxel; changes no result.
+  int most_workers = std::numeric_limits<int>::max();
   bool everywhere = false;  ///< first pass of all: every responsibility of the colour sums is 1
 };
 
@@ -25,6 +29,11 @@ struct PassReport {
   double opacity_march_cpu_seconds = 0;  ///< summed over workers, of march_opacity alone
   double prior_log_likelihood = 0;       ///< log prior of tau given the field used, up to a constant
 };
+
+/// Threads that march at once.
+inline int worker_count(const PassOptions& options, const RunContext& context) {
+  return std::clamp(options.most_workers, 1, context.thread_count());
+}
 
 /// Called after each node of each half of the pass with the share of the pass that is done, from any thread.
 using PassProgress = std::function<void(double fraction)>;

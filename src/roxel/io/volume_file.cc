@@ -247,8 +247,9 @@ void fill_lattice(const Archive& archive, int lattice, Volume& v) {
   vector("color_mean", [&](auto s, const Vec3f& x) { v.color_mean[s] = {x[0], x[1], x[2]}; });
   if (!v.fitted_color.empty())
     vector("color", [&](auto s, const Vec3f& x) { v.fitted_color[s] = {x[0], x[1], x[2]}; });
-  vector("color_cov_diag",
-         [&](auto s, const Vec3f& x) { v.color_cov[s] = PackedCovariance({x[0], x[1], x[2], 0, 0, 0}); });
+  vector("color_cov_diag", [&](auto s, const Vec3f& x) {
+    v.color_cov[s] = PackedCovariance({x[0], x[1], x[2], 0, 0, 0});
+  });
   vector("color_cov_off", [&](auto s, const Vec3f& x) {
     const std::array<float, 6> cov = v.color_cov[s].unpacked();
     v.color_cov[s] = PackedCovariance({cov[0], cov[1], cov[2], x[0], x[1], x[2]});

@@ -119,18 +119,18 @@ struct LevelNeeds {
 };
 
 LevelNeeds level_needs(const LevelEstimate& level, const SampleLoad& load, double largest_image, int nodes,
-                       int threads) {
+                       int threads, int workers) {
   const double bricks = level.voxels / kVoxelsPerBrick;
   const double volume = level.voxels * kChannelBytes + bricks * sizeof(Brick);
   // Checkpoints are written, and last of all depth is made, beside what passes work in.
   const double passing =
-      level.voxels * (kTotalsBytes + kScratchBytes * threads) + threads * bricks * kListedBytesPerBrick +
+      level.voxels * (kTotalsBytes + kScratchBytes * workers) + workers * bricks * kListedBytesPerBrick +
       std::max(threads * largest_image * kResultBytesPerPixel, bricks * kWritingBytesPerBrick);
   const double loading = threads * largest_image * kDecodedBytesPerPixel;
   LevelNeeds needs;
   needs.needed = kProgramBytes + volume + std::max(passing, loading);
   needs.samples = load.bytes;
-  needs.in_flight = threads * (load.largest_node + largest_image * kDecodedBytesPerPixel);
+  needs.in_flight = workers * (load.largest_node + largest_image * kDecodedBytesPerPixel);
   needs.colors = kKeptShare * nodes * level.voxels * sizeof(OwnColors::Entry);
   return needs;
 }
@@ -151,14 +151,14 @@ double level_voxel_size(const Scene& scene, const ReconstructOptions& options, i
 }
 
 std::vector<LevelNeeds> needs_of_levels(const Dataset& dataset, const Scene& scene,
-                                        const ReconstructOptions& options, int threads) {
+                                        const ReconstructOptions& options, int threads, int workers) {
   std::vector<LevelNeeds> needs;
   for (int level = 0; level < options.levels; ++level) {
     const double voxel_size = level_voxel_size(scene, options, level);
     const SampleLoad load = sample_load(dataset, scene, voxel_size, options);
     needs.push_back(level_needs(estimate_level(scene, voxel_size, level == 0, load.rays, layers_of(scene)),
                                 load, largest_image_of(dataset), static_cast<int>(dataset.nodes.size()),
-                                threads));
+                                threads, workers));
     if (options.illumination != IlluminationChoice::kNone)
       needs.back().needed += SmallPhotographs::bytes(dataset);
   }
@@ -185,9 +185,18 @@ double pyramid_bytes(double pixels, int finest_level) {
 
 MemoryPlan plan_memory(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
                        int threads) {
-  const std::vector<LevelNeeds> levels = needs_of_levels(dataset, scene, options, threads);
   MemoryPlan plan;
   plan.limit_bytes = options.memory ? *options.memory * kGiB : memory_at_hand();
+  std::vector<LevelNeeds> levels;
+  for (int workers = threads; workers >= 1; --workers) {
+    levels = needs_of_levels(dataset, scene, options, threads, workers);
+    if (workers < threads) plan.workers = workers;
+    if (std::all_of(levels.begin(), levels.end(), [&](const LevelNeeds& level) {
+          return kMemoryMargin * (level.needed + std::min(level.samples, level.in_flight)) <=
+                 plan.limit_bytes;
+        }))
+      break;
+  }
   for (const LevelNeeds& level : levels) {
     const double room = plan.limit_bytes / kMemoryMargin - level.needed;
     if (level.samples <= room) continue;
@@ -231,7 +240,7 @@ CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const Rec
                            cost.levels.back().steps_per_pass /
                                std::max(1.0, sample_load(dataset, scene, scene.voxel_size, options).rays) *
                                (kColorStepNs + kOpacityStepNs));
-  cost.seconds = 1e-9 * core_ns / threads;
+  cost.seconds = 1e-9 * core_ns / std::min(threads, cost.memory.workers);
   return cost;
 }
 

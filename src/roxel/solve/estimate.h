@@ -23,8 +23,8 @@ struct CostEstimate {
 CostEstimate estimate_cost(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
                            int threads);
 
-/// Shares out options.memory, or else what the machine has at hand: to what all levels need, then to samples,
-/// then to kept colours.
+/// Shares out options.memory, or else what the machine has at hand: to what all levels need, then to threads
+/// that march at once, to samples, and to kept colours.
 MemoryPlan plan_memory(const Dataset& dataset, const Scene& scene, const ReconstructOptions& options,
                        int threads);
 

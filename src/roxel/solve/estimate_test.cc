@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "roxel/solve/cube_fixture.h"
 #include "roxel/solve/reconstruct.h"
@@ -100,6 +101,7 @@ TEST(PlanMemory, GivesUpWhatOnlySavesTimeFirst) {
   EXPECT_TRUE(std::isinf(ample.sample_bytes));
   EXPECT_EQ(ample.kept_color_bytes, MemoryPlan().kept_color_bytes);
   double last_samples = ample.sample_bytes, last_peak = ample.peak_bytes;
+  int last_workers = ample.workers;
   bool samples_given_up = false, fits = true;
   for (double memory = ample.peak_bytes; fits; memory *= 0.97) {
     const MemoryPlan plan = plan_within(memory, dataset, options);
@@ -107,14 +109,38 @@ TEST(PlanMemory, GivesUpWhatOnlySavesTimeFirst) {
     if (fits) {
       EXPECT_LE(plan.peak_bytes, memory * 1.000001);
     }
-    EXPECT_LE(plan.sample_bytes, last_samples);
+    // Fewer threads at once leave room for more samples.
+    if (plan.workers == last_workers) {
+      EXPECT_LE(plan.sample_bytes, last_samples);
+    }
     EXPECT_LE(plan.peak_bytes, last_peak * 1.1);  // nodes in flight are more than what is given up, at first
+    last_workers = plan.workers;
     last_samples = plan.sample_bytes;
     last_peak = plan.peak_bytes;
     samples_given_up |= plan.sample_bytes < 1e6;
   }
   EXPECT_TRUE(samples_given_up);
   EXPECT_LT(last_peak, 0.8 * ample.peak_bytes);
+}
+
+// Of eight threads that march at once, each takes 64 bytes a voxel: as few do as the memory has room for.
+TEST(PlanMemory, FewerThreadsMarchAtOnceBeforeARunIsRefused) {
+  const Dataset dataset = cube_dataset(6, 96);
+  const ReconstructOptions options = options_at(256);
+  const MemoryPlan ample = plan_within(64e9, dataset, options, 8);
+  EXPECT_EQ(ample.workers, MemoryPlan().workers);
+  int last = 8;
+  std::set<int> counts;
+  for (double memory = ample.peak_bytes;; memory *= 0.95) {
+    const MemoryPlan plan = plan_within(memory, dataset, options, 8);
+    const int workers = std::min(plan.workers, 8);
+    EXPECT_LE(workers, last);
+    if (!plan.fits) break;
+    EXPECT_LE(plan.peak_bytes, memory * 1.000001);
+    counts.insert(last = workers);
+  }
+  EXPECT_EQ(*counts.begin(), 1);
+  EXPECT_GT(counts.size(), 3u);
 }
 
 // 102 x 102 squares of 13 bytes a photograph of 512 pixels a side, and the margin.

@@ -12,6 +12,7 @@ struct MemoryPlan {
   /// image file, in each half of a pass.
   double sample_bytes = std::numeric_limits<double>::infinity();
   std::int64_t kept_color_bytes = std::int64_t{1} << 30;  ///< see KeptColors
+  int workers = std::numeric_limits<int>::max();          ///< threads that march at once; see PassOptions
   double limit_bytes = 0;                                 ///< what was to be kept to
   double peak_bytes = 0;  ///< expected resident memory of the process, at most
   bool fits = true;       ///< peak_bytes <= limit_bytes

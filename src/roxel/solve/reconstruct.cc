@@ -512,6 +512,7 @@ PassOptions pass_options(const Scene& scene, const ReconstructOptions& options) 
   pass.prior.spatial_lambda = options.spatial_prior;
   pass.predictive = options.predictive;
   pass.kept_color_bytes = static_cast<std::size_t>(scene.memory.kept_color_bytes);
+  pass.most_workers = scene.memory.workers;
   return pass;
 }
 

@@ -27,12 +27,14 @@ class ViewStages {
         pass_(pass_options(scene_, options)),
         collected_(stages.depth ? reconstruction.volume.slot_count() : 0, dataset.nodes.size(),
                    pass_.kept_color_bytes),
-        scratch_(context.thread_count()) {
+        scratch_(stages.depth ? roxel::worker_count(pass_, context) : context.thread_count()) {
     if (stages.render) colors_ = radiance_colors(reconstruction.volume, scene_.transform, scene_.exposure);
     if (!stages.depth) return;
     samples_ = make_samples(dataset, load, scene_, scene_.voxel_size, options, context);
     collect_color(stack_, samples_, pass_, context, nullptr, collected_);
   }
+
+  int worker_count() const { return static_cast<int>(scratch_.size()); }
 
   void work_on_node(int node, int worker, const std::function<void(const ViewResult&)>& visit) {
     const std::vector<int>& views = dataset_.nodes[node].view_idxs;
@@ -142,7 +144,7 @@ void for_each_view_result(const Dataset& dataset, const PhotographLoader& load,
                           const std::function<void(const ViewResult&)>& visit) {
   if (!stages.depth && !stages.render) return;
   ViewStages work(dataset, load, reconstruction, options, stages, context);
-  parallel_for(dataset.nodes.size(), context.thread_count(), [&](std::int64_t node, int worker) {
+  parallel_for(dataset.nodes.size(), work.worker_count(), [&](std::int64_t node, int worker) {
     work.work_on_node(static_cast<int>(node), worker, visit);
   });
 }

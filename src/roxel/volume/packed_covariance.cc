@@ -11,9 +11,7 @@ constexpr float kLargestDeviation = 65504;  ///< of half floats
 constexpr float kCorrelationSteps = 32767;
 constexpr int kFirst[3] = {0, 0, 1}, kSecond[3] = {1, 2, 2};  // of xy, xz, yz
 
-float from_half(std::uint16_t bits) {
-  return static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(bits));
-}
+float from_half(std::uint16_t bits) { return static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(bits)); }
 
 }  // namespace
 
@@ -31,7 +29,8 @@ PackedCovariance::PackedCovariance(const std::array<float, 6>& covariance) {
 }
 
 std::array<float, 6> PackedCovariance::unpacked() const {
-  const std::array<float, 3> d = {from_half(deviation_[0]), from_half(deviation_[1]), from_half(deviation_[2])};
+  const std::array<float, 3> d = {from_half(deviation_[0]), from_half(deviation_[1]),
+                                  from_half(deviation_[2])};
   std::array<float, 6> covariance;
   for (int c = 0; c < 3; ++c) covariance[c] = d[c] * d[c];
   for (int k = 0; k < 3; ++k)

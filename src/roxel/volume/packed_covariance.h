@@ -1,5 +1,6 @@
 #pragma once
-/// A covariance of three numbers in twelve bytes: deviations as half floats, correlations in steps of 1/32767.
+/// A covariance of three numbers in twelve bytes: deviations as half floats, correlations in steps of
+/// 1/32767.
 
 #include <array>
 #include <cstdint>
