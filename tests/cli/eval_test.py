@@ -452,14 +452,14 @@ class BadTruth(EvalCase):
 
 
 class Daylight(Case):
-    """A street of two nodes, each with its own time; runs with reports."""
+    """A street of three nodes, each with its own time; runs with reports."""
 
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         cls.street, cls.run_folder = cls.folder / "street", cls.folder / "lit"
         cls.small = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--no-mesh", "--no-bp", "--no-refine", "--surround", "off", "--quiet"]
-        for command in (["synth", "street", "-o", cls.street, "--images", "28", "--size", "36x28", "--samples", "1", "--quiet"],
+        for command in (["synth", "street", "-o", cls.street, "--images", "48", "--size", "36x28", "--samples", "1", "--quiet"],
                         ["reconstruct", cls.street, "-o", cls.run_folder, *cls.small, "--illumination", "sky-normal"]):
             done = program.run(*command)
             assert done.returncode == 0, done.stderr
