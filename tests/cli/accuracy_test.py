@@ -34,7 +34,7 @@ class AccuracyCase(program.Case):
     name = None  # of the data set
     bounds = None
     diagonal = None  # of the bounds, world units
-    options = ["--voxel-size", "0.02"]
+    options = ["--voxel-size", "0.02", "--texture", "none", "--no-mesh-pictures"]
 
     @classmethod
     def setUpClass(cls):

@@ -16,7 +16,7 @@ from options_test import MESH
 from program import Case, digest, files_below, run
 
 MESH_FILES = ["mesh.glb", "mesh.mtl", "mesh.obj", "mesh.ply", "mesh.png", "mesh_turntable.jpg", "mesh_views.png"]
-SMALL = ["--resolution", "40", "--levels", "2", "--passes", "3", "--no-render", "--no-report"]
+SMALL = ["--resolution", "40", "--levels", "2", "--passes", "4", "--no-render", "--no-report"]
 PLAIN = [*SMALL, "--no-bp", "--no-refine"]  # where nobody looks at how good the depth maps are
 
 # Each option of the surface: what is asked for besides, a value that must change the result, and where it shows.
