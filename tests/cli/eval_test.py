@@ -458,7 +458,8 @@ class Daylight(Case):
     def setUpClass(cls):
         super().setUpClass()
         cls.street, cls.run_folder = cls.folder / "street", cls.folder / "lit"
-        cls.small = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--no-mesh", "--no-bp", "--no-refine", "--surround", "off", "--quiet"]
+        cls.small = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--surround", "off", "--no-mesh", "--no-bp",
+                     "--no-refine", "--quiet"]
         for command in (["synth", "street", "-o", cls.street, "--images", "48", "--size", "36x28", "--samples", "1", "--quiet"],
                         ["reconstruct", cls.street, "-o", cls.run_folder, *cls.small, "--illumination", "sky-normal"]):
             done = program.run(*command)

@@ -95,7 +95,7 @@ class Mesh(Case):
         for peak in [*stages.values(), *parts, *levels]:
             self.assertGreater(peak, 1e6)
         self.assertEqual(self.summary["peak_memory_bytes"], max([*stages.values(), *levels]))
-        self.assertEqual(stages["mesh"], max(parts))
+        self.assertAlmostEqual(stages["mesh"], max(parts), delta=1e6)  # a page or two come after the last part
         # Not the largest so far: of those that follow one another, some hold less than one before.
         for peaks in (list(stages.values()), parts):
             self.assertTrue(any(after < before for before, after in zip(peaks, peaks[1:])), peaks)

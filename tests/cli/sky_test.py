@@ -440,13 +440,14 @@ class SkyInReconstruct(SkyCase):
 class LightInReconstruct(SkyCase):
     """The same street: what its light is worth, and how it is found."""
 
-    LOOK_AGAIN = ["--levels", "2", "--passes", "5", "--all-passes", "--checkpoint-interval", "0", "--illumination", "sky", "--sky-again"]
+    OFTEN = ["--levels", "2", "--passes", "5", "--all-passes", "--checkpoint-interval", "0"]  # a checkpoint after each of many passes
+    LOOK_AGAIN = [*OFTEN, "--illumination", "sky", "--sky-again"]
 
     sky_options = ["--facets", "4"]
     setUpClass, reconstruct, lights = classmethod(set_up_street), reconstruct_street, lights_of_nodes
 
     def test_photographs_of_several_times_of_day_are_brought_to_one_light(self):
-        _, found = self.reconstruct_once("--sky-again")
+        _, found = self.reconstruct_once("--sky-again")  # which does nothing in a single level
         self.assertEqual(found["scene"]["light"]["illumination"], "sky")
         self.assertTrue(any("several times of day" in note for note in found["notes"]), found["notes"])
 
@@ -501,7 +502,7 @@ class LightInReconstruct(SkyCase):
 
     def test_a_killed_run_goes_on_with_its_light_and_the_skies_that_it_found(self):
         for name, arguments in (("again", self.LOOK_AGAIN),
-                                ("normal", [*self.LOOK_AGAIN[:-3], "--sky", str(self.skies), "--illumination", "sky-normal"])):
+                                ("normal", [*self.OFTEN, "--sky", str(self.skies), "--illumination", "sky-normal"])):
             with self.subTest(name):
                 whole, _ = self.reconstruct_once(*arguments)
                 out, options = self.folder / f"killed-{name}", [*SMALL, *arguments]
