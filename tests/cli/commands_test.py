@@ -143,7 +143,7 @@ class OtherCommands(Case):
 
     def test_memory_is_kept_to_and_changes_no_result(self):
         data = self.folder / "many"
-        self.synth(data, 24, "320x240")
+        self.synth(data, 24, "160x120")
         size = ["--resolution", "32", "--levels", "2", "--passes", "2", "--threads", "1"]
         free = json.loads(self.succeed("info", data, *size, "--json").stdout)["estimate"]
         self.assertTrue(free["memory_fits"])

@@ -46,8 +46,13 @@ class Depth(Case):
         head = (out / "depth/000.exr").read_bytes()[:2000]
         return [name for name in self.REFINED if name + b"\0" in head]
 
+    def finished_run(self, name=None):
+        """A run with all depth maps and no pictures: a copy of this name to change, or the one that all look at."""
+        out, _ = self.reconstruct_once("--no-render", "--no-report")
+        return shutil.copytree(out, self.folder / name) if name else out
+
     def test_every_option_changes_the_depth_maps(self):
-        out, _ = self.reconstruct("options", "--no-render", "--no-report")
+        out = self.finished_run("options")
         known = self.maps(out)
         for option, (base, change) in DEPTH_CHANGES.items():
             with self.subTest(option):
@@ -69,7 +74,7 @@ class Depth(Case):
         self.assertFalse(any(name.startswith(".") for name in files_below(out)), files_below(out))
 
     def test_memory_changes_no_map_and_is_no_part_of_a_run(self):
-        out, _ = self.reconstruct("held", "--no-render", "--no-report")
+        out = self.finished_run("held")
         known = self.maps(out)
         self.succeed("depth", out, "--memory", "0.01", "--quiet")
         self.assertEqual(known, self.maps(out))
@@ -106,9 +111,7 @@ class Depth(Case):
         self.assertFalse((out / "report.html").exists(), "a run without a page gets none")
 
     def test_a_full_disc_leaves_the_earlier_depth_maps(self):
-        out, _ = self.reconstruct("full", "--no-render", "--no-mesh")
-        with_room = self.folder / "with-room"
-        shutil.copytree(out, with_room)
+        out, with_room = self.finished_run("full"), self.finished_run("with-room")
         change = ["--no-refine", "--bp-sigma", "0.5", "--quiet"]
         self.succeed("depth", with_room, *change)
         largest = max(file.stat().st_size for file in (with_room / "depth").glob("*.exr"))
@@ -128,7 +131,7 @@ class Depth(Case):
         self.assertEqual(self.channels(out), list(self.REFINED))
 
     def test_eval_measures_the_methods_side_by_side(self):
-        out, _ = self.reconstruct("measured", "--no-render")
+        out = self.finished_run()
         metrics = self.folder / "measured-metrics"
         text = self.succeed("eval", out, "-o", metrics).stdout
         self.assertRegex(text, r"\| volume .*\n\| bp .*\n\| refined ")
@@ -155,7 +158,7 @@ class Depth(Case):
         self.assertTrue(tracks and all(len(line.split()) >= 12 for line in tracks))
 
     def test_a_disc_that_is_full_leaves_no_half_workspace(self):
-        out, _ = self.reconstruct("full", "--no-render", "--no-report")
+        out = self.finished_run()
         there = self.folder / "half"
         largest = 4 * 64 * 48 * 3  # a normal map, but for its head
         for most_bytes in (5000, largest - 10):
@@ -189,13 +192,13 @@ class Depth(Case):
 
     @unittest.skipIf(os.geteuid() == 0, "root may write anywhere")
     def test_folders_that_cannot_be_written_to_are_named(self):
-        out, _ = self.reconstruct("locked", "--no-render", "--no-report")
+        out = self.finished_run("locked")
         out.chmod(0o555)
         self.addCleanup(out.chmod, 0o755)
         self.expect_error(1, "locked: cannot be written to", "depth", out, "--quiet")
 
     def test_places_that_cannot_be_made_are_named(self):
-        out, _ = self.reconstruct("placed", "--no-render", "--no-report")
+        out = self.finished_run()
         self.expect_error(1, "cannot be made", "convert", out, "--to", "colmap-dense", "-o", "/proc/roxel", "--quiet")
         (self.folder / "a-file").write_text("x")
         self.expect_error(2, "a file", "convert", out, "--to", "colmap-dense", "-o", self.folder / "a-file", "--quiet")
@@ -230,7 +233,7 @@ class Depth(Case):
     def test_bad_runs_are_named(self):
         self.expect_error(2, "expected the folder of a finished run", "depth", self.data)
         self.expect_error(2, "a finished run", "convert", self.data, "--to", "colmap-dense", "-o", self.folder / "no")
-        out, _ = self.reconstruct("bad", "--no-render")
+        out = self.finished_run("bad")
         known = self.maps(out)[1:]
         summary = (out / "summary.json").read_text()
         (out / "depth/000.exr").write_bytes(b"not an image")

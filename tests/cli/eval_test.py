@@ -458,17 +458,21 @@ class Daylight(Case):
     def setUpClass(cls):
         super().setUpClass()
         cls.street, cls.run_folder = cls.folder / "street", cls.folder / "lit"
-        cls.small = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--no-mesh", "--no-bp", "--no-refine", "--quiet"]
-        for command in (["synth", "street", "-o", cls.street, "--images", "48", "--size", "48x38", "--samples", "1", "--quiet"],
+        cls.small = ["--resolution", "24", "--levels", "1", "--passes", "2", "--masks", "none", "--surround", "off", "--no-mesh", "--no-bp",
+                     "--no-refine", "--quiet"]
+        for command in (["synth", "street", "-o", cls.street, "--images", "48", "--size", "36x28", "--samples", "1", "--quiet"],
                         ["reconstruct", cls.street, "-o", cls.run_folder, *cls.small, "--illumination", "sky-normal"]):
             done = program.run(*command)
             assert done.returncode == 0, done.stderr
+
+    def eval_street(self, run, *arguments):
+        return json.loads(self.succeed("eval", run, "--truth", self.street, "--samples", 2000, "--json", *arguments).stdout)
 
     def captions(self, page):
         return re.findall(r"<figcaption>([^<]*)</figcaption>", page.read_text())
 
     def test_lights_are_measured_at_the_same_places(self):
-        found = json.loads(self.succeed("eval", self.run_folder, "--truth", self.street, "--json").stdout)["light"]
+        found = self.eval_street(self.run_folder)["light"]
         self.assertEqual([light["light"] for light in found], ["none", "sky", "run", "true dome", "true light on the surface"])
         self.assertEqual(len({(light["places"], light["albedo"] and light["albedo"]["pixels"]) for light in found}), 1)
         self.assertTrue(0 < found[0]["places"] <= found[0]["shared_places"])
@@ -476,8 +480,8 @@ class Daylight(Case):
         fewer = self.folder / "fewer"
         shutil.copytree(self.run_folder, fewer)
         for name in sorted(os.listdir(fewer / "light"))[::2]:
-            if name.endswith(".exr"): (fewer / "light" / name).write_bytes(exr({c: lambda x, y: 0 for c in "RGB"}, 48, 38))
-        left = json.loads(self.succeed("eval", fewer, "--truth", self.street, "--json").stdout)["light"]
+            if name.endswith(".exr"): (fewer / "light" / name).write_bytes(exr({c: lambda x, y: 0 for c in "RGB"}, 36, 28))
+        left = self.eval_street(fewer)["light"]
         self.assertEqual(len({light["places"] for light in left}), 1)
         self.assertLess(left[0]["places"], found[0]["places"])
         self.assertEqual(left[0]["shared_places"], found[0]["shared_places"])
@@ -488,7 +492,7 @@ class Daylight(Case):
         sky = json.loads((dark / "sky/n00.json").read_text())
         sky["model"] = "none"
         (dark / "sky/n00.json").write_text(json.dumps(sky))
-        skies = json.loads(self.succeed("eval", dark, "--truth", self.street, "--json").stdout)["skies"]
+        skies = self.eval_street(dark)["skies"]
         errors = ("fit_error", "dome_error", "oracle_error", "horizontal_error", "horizontal_sky_error")
         self.assertEqual({skies[0][error] for error in errors}, {None})
         for error in errors: self.assertGreater(skies[1][error], 0)
@@ -504,7 +508,7 @@ class Daylight(Case):
         def kinds(page): return {c: self.captions(page).count(c) for c in ("fitted sky", "photograph", "photograph over its light")}
         before = kinds(self.run_folder / "report.html")
         out = self.folder / "measured"
-        self.succeed("eval", self.run_folder, "--truth", self.street, "-o", out, "--quiet")
+        self.eval_street(self.run_folder, "-o", out)
         self.assertEqual(kinds(out / "report.html"), before)
         again = self.folder / "again"
         shutil.copytree(self.run_folder, again)

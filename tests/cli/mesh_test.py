@@ -17,6 +17,7 @@ from program import Case, digest, files_below, run
 
 MESH_FILES = ["mesh.glb", "mesh.mtl", "mesh.obj", "mesh.ply", "mesh.png", "mesh_turntable.jpg", "mesh_views.png"]
 SMALL = ["--resolution", "40", "--levels", "2", "--passes", "4", "--no-render", "--no-report"]
+PLAIN = [*SMALL, "--no-bp", "--no-refine"]  # where nobody looks at how good the depth maps are
 
 # Each option of the surface: what is asked for besides, a value that must change the result, and where it shows.
 CHANGES = {
@@ -62,9 +63,9 @@ class Mesh(Case):
     def setUpClass(cls):
         super().setUpClass()
         cls.photographs = cls.folder / "photographs"
-        cls.synth(cls.photographs, 16, "128x96")
+        cls.synth(cls.photographs, 12, "96x72")
         cls.run_folder = cls.folder / "run"
-        done = run("reconstruct", cls.photographs, "-o", cls.run_folder, *SMALL, "--json")
+        done = run("reconstruct", cls.photographs, "-o", cls.run_folder, *SMALL, "--report", "--json")
         assert done.returncode == 0, done.stderr
         cls.summary = json.loads(done.stdout)
 
@@ -94,7 +95,7 @@ class Mesh(Case):
         for peak in [*stages.values(), *parts, *levels]:
             self.assertGreater(peak, 1e6)
         self.assertEqual(self.summary["peak_memory_bytes"], max([*stages.values(), *levels]))
-        self.assertEqual(stages["mesh"], max(parts))
+        self.assertAlmostEqual(stages["mesh"], max(parts), delta=1e6)  # a page or two come after the last part
         # Not the largest so far: of those that follow one another, some hold less than one before.
         for peaks in (list(stages.values()), parts):
             self.assertTrue(any(after < before for before, after in zip(peaks, peaks[1:])), peaks)
@@ -123,7 +124,7 @@ class Mesh(Case):
 
     def test_every_option_changes_something(self):
         self.assertEqual(set(CHANGES) | {"mesh", "mesh-pictures"}, MESH)
-        known = {}
+        known = {(): self.run_folder}
         for option, (base, change, name) in CHANGES.items():
             with self.subTest(option):
                 key = tuple(base)
@@ -159,16 +160,16 @@ class Mesh(Case):
         table = [("--faces: ", ["--faces", "4"]), ("--mesh-voxel-size: ", ["--mesh-voxel-size", "0.0005"])]
         for message, arguments in table:
             with self.subTest(message):
-                self.expect_error(2, message, "reconstruct", self.photographs, "-o", again, *SMALL, *arguments, "--quiet")
+                self.expect_error(2, message, "reconstruct", self.photographs, "-o", again, *PLAIN, *arguments, "--quiet")
                 self.assertEqual({f: digest(again / f) for f in before}, before)
-        self.succeed("reconstruct", self.photographs, "-o", again, *SMALL, "--faces", "600", "--resume", "--quiet")
+        self.succeed("reconstruct", self.photographs, "-o", again, *PLAIN, "--faces", "600", "--resume", "--quiet")
         summary = json.loads((again / "summary.json").read_text())
         self.assertTrue(any(note.startswith("resumed after") for note in summary["notes"]), summary["notes"])
         self.assertLessEqual(summary["mesh"]["triangles"], 600)
 
     def test_too_fine_a_mesh_is_refused_before_the_passes(self):
         out = self.folder / "fine"
-        arguments = ["reconstruct", self.photographs, "-o", out, *SMALL, "--mesh-voxel-size", "0.0005"]
+        arguments = ["reconstruct", self.photographs, "-o", out, *PLAIN, "--mesh-voxel-size", "0.0005"]
         said = self.expect_error(2, "--mesh-voxel-size: found 0.0005, expected at least", *arguments, "--verbose").stderr
         self.assertNotIn("pass 1/", said)
         self.assertFalse(out.exists())
@@ -176,13 +177,12 @@ class Mesh(Case):
             self.succeed(*arguments, off, "--passes", "1", "--quiet")
 
     def test_memory_changes_no_mesh(self):
-        ample = self.mesh("ample", "--no-mesh-pictures")
         tight = self.mesh("tight", "--no-mesh-pictures", "--memory", "0.5")
-        self.assertEqual(digest(ample / "mesh.ply"), digest(tight / "mesh.ply"))
+        self.assertEqual(digest(self.run_folder / "mesh.ply"), digest(tight / "mesh.ply"))
 
     def test_a_new_run_whose_mesh_is_refused_can_be_given_another(self):
         out = self.folder / "first"
-        arguments = ["reconstruct", self.photographs, "-o", out, *SMALL, "--faces", "4", "--no-checkpoints", "--quiet"]
+        arguments = ["reconstruct", self.photographs, "-o", out, *PLAIN, "--faces", "4", "--no-checkpoints", "--quiet"]
         self.expect_error(2, "--faces: ", *arguments)
         summary = json.loads((out / "summary.json").read_text())
         self.assertIsNone(summary["mesh"])
@@ -192,7 +192,7 @@ class Mesh(Case):
 
     def test_a_run_whose_views_agree_on_nothing_says_so_and_has_the_rest(self):
         out = self.folder / "none"
-        said = self.succeed("reconstruct", self.photographs, "-o", out, *SMALL, "--min-views", "50").stderr
+        said = self.succeed("reconstruct", self.photographs, "-o", out, *PLAIN, "--min-views", "50").stderr
         self.assertIn("no mesh: ", said)
         self.assertIn("no surface that 50 views agree on", said)
         summary = json.loads((out / "summary.json").read_text())
@@ -212,20 +212,19 @@ class Mesh(Case):
         shutil.copytree(self.run_folder, copy)
         small, _ = self.reconstruct("small")
         shutil.copy(small / "depth/000.exr", copy / "depth/000.exr")
-        self.expect_error(2, "000.exr: found 64 x 48 pixels, expected 128 x 96", "mesh", copy, "--quiet")
+        self.expect_error(2, "000.exr: found 64 x 48 pixels, expected 96 x 72", "mesh", copy, "--quiet")
 
     def test_eval_measures_it_where_there_is_a_true_surface(self):
         truth = self.folder / "truth"
         truth.mkdir()
         shutil.copy(self.run_folder / "mesh.ply", truth / "mesh.ply")
-        found = json.loads(self.succeed("eval", self.run_folder, "--truth", truth, "--json").stdout)["surfaces"][-1]
+        found = json.loads(self.succeed("eval", self.run_folder, "--truth", truth, "--samples", 20000, "--json").stdout)["surfaces"][-1]
         self.assertEqual(found["name"], "mesh")
         self.assertGreater(found["within"][0]["f_score"], 0.999)
 
     def test_the_report_shows_it(self):
         out = self.folder / "shown"
-        arguments = [a for a in SMALL if a != "--no-report"]
-        self.succeed("reconstruct", self.photographs, "-o", out, *arguments, "--quiet")
+        shutil.copytree(self.run_folder, out)
         page = (out / "report.html").read_text()
         self.assertIn("<h2>Surface</h2>", page)
         self.assertIn('class="turntable"', page)
@@ -236,7 +235,7 @@ class Mesh(Case):
         self.assertIn(f"<td>triangles</td><td>{triangles}</td>", again)
         self.assertNotIn("textured", again)
         self.assertEqual(page.count("<figcaption>depth, refined"), again.count("<figcaption>depth, refined"))
-        said = self.succeed("depth", out).stderr
+        said = self.succeed("depth", out, "--no-refine").stderr
         self.assertIn("the mesh is still that of the earlier depth maps", said)
         self.assertIn('class="turntable"', (out / "report.html").read_text())
 

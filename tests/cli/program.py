@@ -70,6 +70,8 @@ def numbers(summary):
 class Case(unittest.TestCase):
     """A folder of its own with a data set of four photographs, 64 x 48."""
 
+    shared = {}  # by class and options: runs and their summaries
+
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-cli-"))
@@ -106,6 +108,13 @@ class Case(unittest.TestCase):
         out = self.folder / name
         self.succeed("reconstruct", data or self.data, "-o", out, *TINY, *arguments, "--quiet")
         return out, json.loads((out / "summary.json").read_text())
+
+    def reconstruct_once(self, *arguments):
+        """The same, made once for all tests of the class that ask for it; they leave it as it is."""
+        key = type(self), arguments
+        if key not in self.shared:
+            self.shared[key] = self.reconstruct(f"shared-{len(self.shared)}", *arguments)
+        return self.shared[key]
 
 
 def main():

@@ -16,7 +16,7 @@ import program
 from program import Case, digests, files_below, main, numbers, run, start_until
 
 # Passes of some hundredths of a second each, and a checkpoint after each.
-OFTEN = ["--resolution", "48", "--levels", "2", "--passes", "8", "--all-passes", "--no-mesh", "--no-refine",
+OFTEN = ["--resolution", "40", "--levels", "2", "--passes", "8", "--all-passes", "--no-mesh", "--no-refine",
          "--checkpoint-interval", "0"]
 
 
