@@ -71,9 +71,9 @@ void row(const char* what, int threads, const Prepare& prepare, const Work& work
 }
 
 /// A gyroid that goes four times through its box, `thickness` voxels thick, holds about 12.4 side^2 thickness
-/// voxels; after dilation by one, two more layers; after division, eight times as many.
+/// voxels; after dilation by one, three more layers; after division, eight times as many.
 int parent_side_in_bricks(std::int64_t voxels, double thickness) {
-  const double side = std::sqrt(static_cast<double>(voxels) / (8 * 12.4 * (thickness + 2.4)));
+  const double side = std::sqrt(static_cast<double>(voxels) / (8 * 12.4 * (thickness + 3.1)));
   return std::max(2, static_cast<int>(std::lround(side / kBrickSide)));
 }
 
