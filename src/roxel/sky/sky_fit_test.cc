@@ -99,6 +99,28 @@ TEST(FitSky, WindowsAreNoSky) {
   EXPECT_GT(mask.at(180, 40), 200);
 }
 
+// Haze darkens the sky in a gap between walls by more than any model has, bit by bit; at its bottom is
+// something smooth that is a sixth darker still.
+TEST(FitSky, SkyIsFollowedDownAGapAsFarAsItChangesBitByBit) {
+  Square square;
+  square.roof_deg = 25;
+  SkyPicture picture = panorama_of(clear_sky(), square);
+  constexpr int kLeft = 20, kRight = 28, kTop = 65, kBottom = 84;
+  const NodeSky sky = clear_sky();
+  for (int y = kTop; y < 90; ++y)
+    for (int x = kLeft; x < kRight; ++x) {
+      const Eigen::Vector3d light = sky.radiance_in_sky(picture.rays.direction(x + 0.5, y + 0.5));
+      const double haze = std::exp(-0.03 * (y - kTop)) * (y < kBottom ? 1 : 0.85);
+      for (int c = 0; c < 3; ++c) picture.rgb.pixel(x, y)[c] = static_cast<float>(haze * light[c]);
+    }
+  const Mask mask = soft_sky_mask(picture, fit_one(picture));
+  for (int y = kTop; y < 90; ++y) {
+    EXPECT_EQ(mask.at(24, y) > 200, y < kBottom) << y;
+    EXPECT_LT(mask.at(kLeft - 3, y), 10);
+    EXPECT_LT(mask.at(kRight + 2, y), 10);
+  }
+}
+
 TEST(FitSky, TheSunsRegionOverridesTheMasks) {
   const NodeSky truth = clear_sky();
   const SkyPicture picture = panorama_of(truth, {});
@@ -207,7 +229,7 @@ TEST(FitSky, WhatAVolumeLeavesUnexplainedMayBeCloud) {
   const SkyFit before = fit_one(alone, options), after = fit_one(seen, options);
   const double iou_before = iou(soft_sky_mask(alone, before), surface),
                iou_after = iou(soft_sky_mask(seen, after), surface);
-  EXPECT_LT(iou_before, 0.6);
+  EXPECT_LT(iou_before, 0.75);
   EXPECT_GT(iou_after, 0.8);  // facets of 7 degrees lose the edges
 }
 

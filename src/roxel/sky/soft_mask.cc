@@ -12,7 +12,28 @@ constexpr double kElsewhere = 1 / (3.9 * 1.4 * 1.4);
 /// this.
 constexpr double kLeastPixelSigma = 0.02, kMostPixelSigma = 0.1;
 constexpr int kReach = 8;                  ///< facets that a correction is carried
+constexpr float kDarkest = 1e-12f;         ///< of light whose logarithm is taken
 constexpr double kAsGoodAsClipped = 0.75;  ///< of the clip level, for a model
+
+/// 0 where there are none.
+template <class Number>
+double median(std::vector<Number>& numbers) {
+  if (numbers.empty()) return 0;
+  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
+  std::nth_element(numbers.begin(), middle, numbers.end());
+  return *middle;
+}
+
+/// Of sky, for errors of a logarithm of each channel and their deviations.
+float posterior(const Eigen::Vector3d& error, const Eigen::Vector3d& sigma) {
+  double exponent = 0, density = 1;
+  for (int c = 0; c < 3; ++c) {
+    exponent += 0.5 * (error[c] / sigma[c]) * (error[c] / sigma[c]);
+    density /= std::sqrt(2 * M_PI) * sigma[c];
+  }
+  const double sky = density * std::exp(-exponent);
+  return static_cast<float>(sky / (sky + kElsewhere));
+}
 
 class PixelMasking {
  public:
@@ -26,6 +47,7 @@ class PixelMasking {
     for (int y = 0; y < height_; ++y)
       for (int x = 0; x < width_; ++x) look(x, y);
     grow();
+    follow();
     Mask mask(width_, height_, 0);
     for (std::size_t i = 0; i < likeness_.size(); ++i)
       if (reached_[i]) mask.data()[i] = static_cast<std::uint8_t>(std::lround(255 * likeness_[i]));
@@ -34,6 +56,13 @@ class PixelMasking {
 
  private:
   std::size_t at(int x, int y) const { return static_cast<std::size_t>(y) * width_ + x; }
+
+  template <class Visit>
+  void for_each_neighbour(std::size_t i, Visit&& visit) const {
+    const int x = static_cast<int>(i % width_), y = static_cast<int>(i / width_);
+    for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}})
+      if (x + dx >= 0 && y + dy >= 0 && x + dx < width_ && y + dy < height_) visit(at(x + dx, y + dy));
+  }
 
   /// No model fits everywhere: log(seen / model) of the facets of the fit, and beyond them as far as a few
   /// facets what their neighbours have.
@@ -72,21 +101,20 @@ class PixelMasking {
       for (std::size_t f = 0; f < fit_.used.size(); ++f)
         if (const FacetLight& facet = fit_.light.facets[f]; fit_.used[f] && facet.pixels > 1)
           deviations.push_back(std::sqrt(facet.variance[c]) / facet.mean[c]);
-      double middle = 0;
-      if (!deviations.empty()) {
-        const auto at = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
-        std::nth_element(deviations.begin(), at, deviations.end());
-        middle = *at;
-      }
-      pixel_sigma_[c] = std::clamp(middle, kLeastPixelSigma, kMostPixelSigma);
+      pixel_sigma_[c] = std::clamp(median(deviations), kLeastPixelSigma, kMostPixelSigma);
     }
+  }
+
+  /// Whether the pixel is one at all, and not below the horizon.
+  bool may_be_sky(int x, int y) const {
+    if (!picture_.valid.empty() && picture_.valid.at(x, y) != 255) return false;
+    return picture_.rays.direction(x + 0.5, y + 0.5).z() >= 0;
   }
 
   /// Posterior of sky by colour alone.
   void look(int x, int y) {
-    if (!picture_.valid.empty() && picture_.valid.at(x, y) != 255) return;
+    if (!may_be_sky(x, y)) return;
     const Eigen::Vector3d direction = picture_.rays.direction(x + 0.5, y + 0.5);
-    if (direction.z() < 0) return;
     const FacetSphere& sphere = *fit_.light.sphere;
     if (!sphere.contains(last_facet_, direction)) last_facet_ = sphere.facet_at(direction);
     facet_[at(x, y)] = last_facet_;
@@ -98,16 +126,13 @@ class PixelMasking {
     }
     const Eigen::Vector3d model =
         (fit_.fitted.radiance_in_sky(direction).array() * correction_[last_facet_].array().exp()).matrix();
-    double exponent = 0, density = 1;
+    const double unrest = fit_.beyond_model[last_facet_] ? fit_.light.facets[last_facet_].contrast : 0;
+    Eigen::Vector3d error, sigma;
     for (int c = 0; c < 3; ++c) {
-      const double unrest = fit_.beyond_model[last_facet_] ? fit_.light.facets[last_facet_].contrast : 0;
-      const double sigma = std::hypot(fit_.fitted.relative_sigma[c], pixel_sigma_[c], unrest);
-      const double error = log_error(picture_.rgb.pixel(x, y)[c], model[c]) / sigma;
-      exponent += 0.5 * error * error;
-      density /= std::sqrt(2 * M_PI) * sigma;
+      error[c] = log_error(picture_.rgb.pixel(x, y)[c], model[c]);
+      sigma[c] = std::hypot(fit_.fitted.relative_sigma[c], pixel_sigma_[c], unrest);
     }
-    const double sky = density * std::exp(-exponent);
-    likeness_[at(x, y)] = static_cast<float>(sky / (sky + kElsewhere));
+    likeness_[at(x, y)] = posterior(error, sigma);
   }
 
   /// A clipped pixel says "at least this".
@@ -141,11 +166,67 @@ class PixelMasking {
       if (likeness_[i] > 0.5f &&
           (fit_.used[facet_[i]] || fit_.beyond_model[facet_[i]] || fit_.clipped_sky[facet_[i]]))
         reach(i);
+    for (std::size_t n = 0; n < queue.size(); ++n) for_each_neighbour(queue[n], reach);
+  }
+
+  bool is_sky(std::size_t i) const { return reached_[i] && likeness_[i] > 0.5f; }
+
+  /// Goes on from the sky to pixels that look like the sky just beside them, where the model is at its end:
+  /// low in gaps between houses, and in clouds.
+  void follow() {
+    if (!fit_.fitted.has_light()) return;
+    logarithms_ = Image(width_, height_, 3);
+    for (std::size_t i = 0; i < logarithms_.data().size(); ++i)
+      logarithms_.data()[i] = std::log(std::max(picture_.rgb.data()[i], kDarkest));
+    find_noise();
+    std::vector<std::size_t> queue;
+    std::vector<std::uint8_t> waits(likeness_.size(), 0);
+    const auto ask_around = [&](std::size_t i) {
+      for_each_neighbour(i, [&](std::size_t n) {
+        if (is_sky(n) || waits[n]) return;
+        waits[n] = 1;
+        queue.push_back(n);
+      });
+    };
+    for (std::size_t i = 0; i < likeness_.size(); ++i)
+      if (is_sky(i)) ask_around(i);
     for (std::size_t n = 0; n < queue.size(); ++n) {
-      const int x = static_cast<int>(queue[n] % width_), y = static_cast<int>(queue[n] / width_);
-      for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}})
-        if (x + dx >= 0 && y + dy >= 0 && x + dx < width_ && y + dy < height_) reach(at(x + dx, y + dy));
+      const std::size_t i = queue[n];
+      waits[i] = 0;
+      const float likeness =
+          likeness_to_sky_around(static_cast<int>(i % width_), static_cast<int>(i / width_));
+      if (!(likeness > 0.5f)) continue;
+      likeness_[i] = likeness;
+      reached_[i] = 1;
+      ask_around(i);
     }
+  }
+
+  /// What pixels of the sky that lie side by side differ by, as a deviation of each: the median.
+  void find_noise() {
+    for (int c = 0; c < 3; ++c) {
+      std::vector<float> differences;
+      for (int y = 0; y < height_; ++y)
+        for (int x = 1; x < width_; ++x)
+          if (is_sky(at(x, y)) && is_sky(at(x - 1, y)))
+            differences.push_back(std::abs(logarithms_.pixel(x, y)[c] - logarithms_.pixel(x - 1, y)[c]));
+      constexpr double kDeviation = 1.0484;  // of each, for a median of 1 of Gaussians' absolute difference
+      noise_[c] = std::clamp(kDeviation * median(differences), kLeastPixelSigma, kMostPixelSigma);
+    }
+  }
+
+  /// Posterior of sky by the mean colour of the sky's pixels around.
+  float likeness_to_sky_around(int x, int y) const {
+    constexpr int kRadius = 1, kLeastCount = 2;
+    if (!may_be_sky(x, y)) return 0;
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    int count = 0;
+    for (int v = std::max(0, y - kRadius); v <= std::min(height_ - 1, y + kRadius); ++v)
+      for (int u = std::max(0, x - kRadius); u <= std::min(width_ - 1, x + kRadius); ++u)
+        if (is_sky(at(u, v))) sum += Eigen::Vector3f(logarithms_.pixel(u, v)), ++count;
+    if (count < kLeastCount) return 0;
+    const Eigen::Vector3f error = Eigen::Vector3f(logarithms_.pixel(x, y)) - sum / static_cast<float>(count);
+    return posterior(error.cast<double>(), noise_);
   }
 
   const SkyPicture& picture_;
@@ -156,6 +237,8 @@ class PixelMasking {
   std::vector<float> likeness_;
   std::vector<int> facet_;
   std::vector<std::uint8_t> reached_;
+  Image logarithms_;                                 ///< of the picture
+  Eigen::Vector3d noise_ = Eigen::Vector3d::Zero();  ///< of logarithms
 };
 
 }  // namespace

@@ -4,73 +4,96 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "roxel/base/parallel.h"
 
 namespace roxel {
 namespace {
 
-constexpr std::uint8_t kSurelySky = 250;  ///< of 255, at least
-constexpr double kMarginPixels = 0.5;
-constexpr float kWeak = 0.3f;  ///< opacity below which a voxel is haze rather than surface
+constexpr double kNearlyAll = 0.9;       ///< of a footprint: the rest is an outline's mixed pixels
+constexpr double kLeastFootprint = 0.5;  ///< pixels, along each axis
+constexpr float kWeak = 0.5f;            ///< opacity below which a voxel is haze rather than surface
 
-/// How many pixels of any rectangle are surely sky: sums over all pixels above and to the left.
-class SkyCount {
+/// The mean of a photograph's mask of the sky over any rectangle: sums over all that is above and to the
+/// left.
+class SkyShare {
  public:
-  explicit SkyCount(const Photograph& photo)
-      : width_(photo.sky.width()), height_(photo.sky.height()), sums_((width_ + 1) * (height_ + 1), 0) {
-    for (std::int64_t y = 0; y < height_; ++y)
-      for (std::int64_t x = 0; x < width_; ++x) {
-        const std::int64_t i = y * width_ + x;
+  explicit SkyShare(const Photograph& photo)
+      : width_(photo.sky.width()),
+        height_(photo.sky.height()),
+        sums_(static_cast<std::size_t>(width_ + 1) * (height_ + 1), 0) {
+    for (int y = 0; y < height_; ++y) {
+      std::uint32_t row = 0;
+      for (int x = 0; x < width_; ++x) {
+        const std::size_t i = static_cast<std::size_t>(y) * width_ + x;
         const bool seen = photo.valid.empty() || photo.valid.data()[i] == 255;  // not beyond the lens
-        const bool sky = seen && photo.sky.data()[i] >= kSurelySky;
-        at(x + 1, y + 1) = at(x, y + 1) + at(x + 1, y) - at(x, y) + sky;
+        if (seen) row += photo.sky.data()[i] >> kDroppedBits;
+        at(x + 1, y + 1) = at(x + 1, y) + row;
       }
+    }
   }
 
-  enum class Share { kNone, kSome, kAll };
-  /// Of the pixels that the rectangle, and the margin around it, touches; kSome where part is outside the
-  /// image.
-  Share within(const Eigen::AlignedBox2d& pixels) const {
-    const Eigen::Vector2d first = (pixels.min().array() - kMarginPixels).floor();
-    const Eigen::Vector2d last = (pixels.max().array() + kMarginPixels).floor() + 1;
-    const double left = first.x(), top = first.y(), right = last.x(), bottom = last.y();
-    const auto x0 = static_cast<std::int64_t>(std::clamp(left, 0.0, static_cast<double>(width_)));
-    const auto y0 = static_cast<std::int64_t>(std::clamp(top, 0.0, static_cast<double>(height_)));
-    const auto x1 = static_cast<std::int64_t>(std::clamp(right, 0.0, static_cast<double>(width_)));
-    const auto y1 = static_cast<std::int64_t>(std::clamp(bottom, 0.0, static_cast<double>(height_)));
-    const std::int64_t sky = x1 > x0 && y1 > y0 ? at(x1, y1) - at(x0, y1) - at(x1, y0) + at(x0, y0) : 0;
-    if (sky == 0) return Share::kNone;
-    const bool inside = left >= 0 && top >= 0 && right <= width_ && bottom <= height_;
-    return inside && sky == (x1 - x0) * (y1 - y0) ? Share::kAll : Share::kSome;
+  /// In [0, 1]; 0 outside the image.
+  double within(const Eigen::AlignedBox2d& pixels) const {
+    const Eigen::Vector2d half = (0.5 * pixels.sizes()).cwiseMax(0.5 * kLeastFootprint);
+    const Eigen::Vector2d first = inside(pixels.center() - half), last = inside(pixels.center() + half);
+    const double area = (last - first).prod();
+    if (!(area > 0)) return 0;
+    const double sum = sum_to(last.x(), last.y()) - sum_to(first.x(), last.y()) -
+                       sum_to(last.x(), first.y()) + sum_to(first.x(), first.y());
+    return sum / (kFull * area);
   }
+  bool has(const Eigen::Vector2d& pixel) const { return inside(pixel) == pixel; }
 
  private:
-  std::int32_t& at(std::int64_t x, std::int64_t y) { return sums_[y * (width_ + 1) + x]; }
-  std::int32_t at(std::int64_t x, std::int64_t y) const { return sums_[y * (width_ + 1) + x]; }
+  /// Four bits of a mask's eight are enough, and their sums fit for 2^28 pixels.
+  static constexpr int kDroppedBits = 4;
+  static constexpr double kFull = 255 >> kDroppedBits;
 
-  std::int64_t width_, height_;
-  std::vector<std::int32_t> sums_;
+  Eigen::Vector2d inside(const Eigen::Vector2d& pixel) const {
+    return pixel.cwiseMax(0).cwiseMin(Eigen::Vector2d(width_, height_));
+  }
+  /// Over all that is above and to the left of a position in the image.
+  double sum_to(double u, double v) const {
+    const int x = std::min(static_cast<int>(u), width_ - 1), y = std::min(static_cast<int>(v), height_ - 1);
+    const double fu = u - x, fv = v - y;
+    return (1 - fv) * ((1 - fu) * at(x, y) + fu * at(x + 1, y)) +
+           fv * ((1 - fu) * at(x, y + 1) + fu * at(x + 1, y + 1));
+  }
+  std::size_t index(int x, int y) const { return static_cast<std::size_t>(y) * (width_ + 1) + x; }
+  std::uint32_t& at(int x, int y) { return sums_[index(x, y)]; }
+  std::uint32_t at(int x, int y) const { return sums_[index(x, y)]; }
+
+  int width_, height_;
+  std::vector<std::uint32_t> sums_;
 };
 
 /// One photograph's view of cubes along the axes.
 struct SkyView {
   PinholeCamera camera;
-  SkyCount sky;
+  SkyShare sky;
 
-  SkyCount::Share before(const Eigen::Vector3d& centre, double side) const {
+  /// The rectangle around a cube's corners; nothing where the camera is within it or beyond.
+  std::optional<Eigen::AlignedBox2d> footprint(const Eigen::Vector3d& centre, double side) const {
     Eigen::AlignedBox2d pixels;
-    int behind = 0;
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3d off(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5);
       const Eigen::Vector3d seen = camera.project(centre + side * off);
-      if (seen.z() > 0)
-        pixels.extend(Eigen::Vector2d(seen.head<2>()));
-      else
-        ++behind;
+      if (!(seen.z() > 0)) return {};
+      pixels.extend(Eigen::Vector2d(seen.head<2>()));
     }
-    if (behind > 0) return behind == 8 ? SkyCount::Share::kNone : SkyCount::Share::kSome;
-    return sky.within(pixels);
+    return pixels;
+  }
+
+  bool is_before_sky(const Eigen::Vector3d& centre, double side) const {
+    const auto pixels = footprint(centre, side);
+    return pixels && sky.has(camera.project(centre).head<2>()) && sky.within(*pixels) >= kNearlyAll;
+  }
+  /// Whether no part of a cube is.
+  bool has_no_sky(const Eigen::Vector3d& centre, double side) const {
+    const auto pixels = footprint(centre, side);
+    return pixels && sky.within(*pixels) == 0;
   }
 };
 
@@ -100,11 +123,10 @@ void look(const BrickIndex& index, const Brick& brick, const SkyView& view, std:
   const Eigen::Vector3d middle =
       0.5 *
       (frame.voxel_centre(first) + frame.voxel_centre(first + Eigen::Vector3i::Constant(kBrickSide - 1)));
-  if (view.before(middle, kBrickSide * size) == SkyCount::Share::kNone) return;
+  if (view.has_no_sky(middle, kBrickSide * size)) return;
   brick.for_each_voxel([&](int v, std::uint32_t slot) {
     if (witnesses.are_two(slot)) return;
-    if (view.before(frame.voxel_centre(voxel_of(brick, v)), size) == SkyCount::Share::kAll)
-      witnesses.add(slot, witness);
+    if (view.is_before_sky(frame.voxel_centre(voxel_of(brick, v)), size)) witnesses.add(slot, witness);
   });
 }
 
@@ -138,7 +160,7 @@ std::int64_t carve_sky(const Dataset& dataset, const PhotographLoader& load,
     if (!sky_masked[v]) continue;
     const Photograph photo = load(dataset.views[v]);
     if (photo.sky.empty()) continue;
-    const SkyView view{dataset.views[v].camera, SkyCount(photo)};
+    const SkyView view{dataset.views[v].camera, SkyShare(photo)};
     for (int lattice = 0; lattice < volume.lattice_count(); ++lattice) {
       const BrickIndex& index = volume.index(lattice);
       parallel_for_blocks(std::ssize(index.bricks()), kGrain, context.thread_count(),

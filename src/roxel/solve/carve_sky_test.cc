@@ -8,6 +8,7 @@ namespace roxel {
 namespace {
 
 constexpr int kPhotoSide = 100;  ///< pixels
+constexpr float kTau = 1;         ///< of the full volume: more opaque than not
 
 /// Masks of both views of one node.
 const std::vector<std::uint8_t> kFirst = {1, 1, 0, 0}, kSecond = {0, 0, 1, 1};
@@ -23,7 +24,7 @@ Volume full_volume() {
   lattices.push_back(std::move(topology));
   Volume volume(std::move(lattices));
   volume.resize_channels();
-  std::fill(volume.tau.begin(), volume.tau.end(), 0.5f);
+  std::fill(volume.tau.begin(), volume.tau.end(), kTau);
   std::fill(volume.support.begin(), volume.support.end(), std::array<float, 2>{3, 6});
   return volume;
 }
@@ -45,7 +46,7 @@ Dataset four_cameras() {
   return dataset;
 }
 
-/// Above row `horizon` all is sky, but for one pixel at (70, 10).
+/// Above row `horizon` all is sky, but for a square of two pixels at (70, 10).
 Photograph sky_above(int horizon) {
   Photograph photo;
   photo.rgb = Image(kPhotoSide, kPhotoSide, 3);
@@ -53,7 +54,7 @@ Photograph sky_above(int horizon) {
   photo.sky = Mask(kPhotoSide, kPhotoSide, 0);
   for (int y = 0; y < horizon; ++y)
     for (int x = 0; x < kPhotoSide; ++x) photo.sky.at(x, y) = 252;
-  photo.sky.at(70, 10) = 55;
+  for (const auto& [x, y] : {std::pair{70, 10}, {71, 10}, {70, 11}, {71, 11}}) photo.sky.at(x, y) = 55;
   return photo;
 }
 
@@ -79,25 +80,40 @@ TEST(CarveSky, EmptiesWhatAPhotographShowsAsSkyAlone) {
   const Volume volume = carved(50, kFirst);  // above the optical axis: y < 0
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 0.05}), 0);
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 1.05}), 0);  // behind it, too
-  EXPECT_EQ(tau_at(volume, {0.05, 0.75, 0.05}), 0.5f);
-  // On the horizon, and where a pixel of the footprint is something else: row 10 is y / z = -0.4, column 70
+  EXPECT_EQ(tau_at(volume, {0.05, 0.75, 0.05}), kTau);
+  // On the horizon, and where a quarter of the footprint is something else: row 10 is y / z = -0.4, column 70
   // 0.2.
-  EXPECT_EQ(tau_at(volume, {0.05, -0.05, 0.05}), 0.5f);
-  EXPECT_EQ(tau_at(volume, {0.65, -1.15, -1.05}), 0.5f);
+  EXPECT_EQ(tau_at(volume, {0.05, -0.05, 0.05}), 0);  // down to row 50
+  EXPECT_EQ(tau_at(carved(49, kFirst), {0.05, -0.05, 0.05}), kTau);
+  EXPECT_EQ(tau_at(volume, {0.65, -1.15, -1.05}), kTau);
   EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.05}), 0);
 }
 
-TEST(CarveSky, LeavesWhatIsPartlyOutsideTheImage) {
-  const Volume volume = carved(kPhotoSide, kFirst);
-  EXPECT_EQ(tau_at(volume, {0.05, 0.05, -1.15}), 0);
-  EXPECT_EQ(tau_at(volume, {0.05, -1.15, -1.15}), 0);  // row 10
-  EXPECT_EQ(tau_at(full_volume(), {0.05, 0.05, 0}), 0.5f);
+TEST(CarveSky, LeavesWhatTheSkyFillsToEightTenths) {
   const Dataset dataset = four_cameras();
-  for (const double x : {-1.15, 1.15}) {
-    // Column 50 + 100 x / z: at -1.15 of the second camera that is 50 - 155 / 2.85, outside.
-    const Volume by_second = carved(kPhotoSide, kSecond);
-    EXPECT_EQ(tau_at(by_second, {x, 0.05, -1.15}), x < 0 ? 0.5f : 0.0f);
+  const Eigen::Vector3d at(0.05, -0.75, 0.05);  // rows 29 to 32
+  for (const auto& [dark_rows, emptied] : {std::pair{0.3, true}, {0.7, false}}) {
+    const PhotographLoader load = [&](const View&) {
+      Photograph photo = sky_above(50);
+      for (int x = 0; x < kPhotoSide; ++x)
+        photo.sky.at(x, 30) = static_cast<std::uint8_t>(255 * (1 - dark_rows));
+      return photo;
+    };
+    Volume volume = full_volume();
+    carve_sky(dataset, load, kFirst, UpdateRule::kPosterior, RunContext(1), volume);
+    EXPECT_EQ(tau_at(volume, at) == 0, emptied) << dark_rows;
   }
+}
+
+TEST(CarveSky, LeavesWhatHasItsCentreOutsideTheImage) {
+  const Volume by_first = carved(kPhotoSide, kFirst), by_second = carved(kPhotoSide, kSecond);
+  EXPECT_EQ(tau_at(by_first, {0.05, 0.05, -1.15}), 0);
+  EXPECT_EQ(tau_at(by_first, {0.05, -1.15, -1.15}), 0);  // row 10
+  // Column 50 + 100 x / z of the second camera: 50 - 155 / 2.85 is outside.
+  EXPECT_EQ(tau_at(by_second, {-1.15, 0.05, -1.15}), kTau);
+  EXPECT_EQ(tau_at(by_second, {1.15, 0.05, -1.15}), 0);
+  // 50 - 100 * 1.45 / 2.95 = 0.8, and its left corners are 1.5 / 2.9 off: the part that is seen says it.
+  EXPECT_EQ(tau_at(by_second, {-1.05, 0.05, -1.05}), 0);
 }
 
 TEST(CarveSky, LeavesWhatTheLensDoesNotReach) {
@@ -109,27 +125,27 @@ TEST(CarveSky, LeavesWhatTheLensDoesNotReach) {
   };
   Volume volume = full_volume();
   carve_sky(four_cameras(), load, kFirst, UpdateRule::kPosterior, RunContext(1), volume);
-  EXPECT_EQ(tau_at(volume, {0.05, -1.15, 0.05}), 0.5f);  // rows 20 to 24
+  EXPECT_EQ(tau_at(volume, {0.05, -1.15, 0.05}), kTau);  // rows 20 to 24
   EXPECT_EQ(tau_at(volume, {0.05, -0.75, 0.05}), 0);
 }
 
 TEST(CarveSky, TakesTwoNodesWhereTwoKnowTheirSky) {
   const Eigen::Vector3d above(0.05, -0.75, 0.05);
-  EXPECT_EQ(tau_at(carved(50, {0, 0, 0, 0}), above), 0.5f);
-  EXPECT_EQ(tau_at(carved(50, {}), above), 0.5f);
-  EXPECT_EQ(tau_at(carved(50, {1, 0, 0, 0}), above), 0.5f) << "one photograph";
+  EXPECT_EQ(tau_at(carved(50, {0, 0, 0, 0}), above), kTau);
+  EXPECT_EQ(tau_at(carved(50, {}), above), kTau);
+  EXPECT_EQ(tau_at(carved(50, {1, 0, 0, 0}), above), kTau) << "one photograph";
   EXPECT_EQ(tau_at(carved(50, {0, 0, 1, 1}), above), 0) << "two of the only node";
   EXPECT_EQ(tau_at(carved(50, {1, 0, 1, 0}), above), 0) << "one of each node";
   // The second node's photographs show no sky: the first's two are one witness.
   Volume volume = full_volume();
   const PhotographLoader load = [](const View& view) { return sky_above(view.name < "2" ? 50 : 0); };
   carve_sky(four_cameras(), load, {1, 1, 1, 1}, UpdateRule::kPosterior, RunContext(1), volume);
-  EXPECT_EQ(tau_at(volume, above), 0.5f);
+  EXPECT_EQ(tau_at(volume, above), kTau);
 }
 
 TEST(CarveSky, OneIsEnoughForHaze) {
   const Eigen::Vector3d above(0.05, -0.75, 0.05);
-  for (const auto& [opacity, emptied] : {std::pair{0.28f, true}, {0.32f, false}}) {
+  for (const auto& [opacity, emptied] : {std::pair{0.48f, true}, {0.52f, false}}) {
     Volume volume = full_volume();
     std::fill(volume.tau.begin(), volume.tau.end(), tau_from_alpha(opacity));
     carve_sky(
