@@ -217,6 +217,7 @@ const BadSet kBadSets[] = {
     {"NearBeyondFar", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"near\": 2.5"), {"frames[0].far", "found 2", "more than near, 2.5"}},
     {"NegativeNear", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"near\": -1"), {"frames[0].near", "-1", "more than 0"}},
     {"LatitudeOutOfRange", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"latitude\": 91"), {"frames[0].latitude", "91", "-90 to 90"}},
+    {"LatitudeOfAllOutOfRange", Base::kTransforms, replace("transforms.json", "{", "{\"lat\": 91,"), {"transforms.json: lat", "91", "-90 to 90"}},
     {"LongitudeOutOfRange", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"longitude\": -200"), {"frames[0].longitude", "-200", "-180 to 180"}},
     {"TimeWithoutZone", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"time_utc\": \"2003-08-21T16:50:00\""), {"frames[0].time_utc", "'2003-08-21T16:50:00'", "zone"}},
     {"DayThatIsNone", Base::kTransforms, replace("transforms.json", "\"near\": 1", "\"time_utc\": \"2003-02-30T16:50:00Z\""), {"frames[0].time_utc", "2003-02-30"}},

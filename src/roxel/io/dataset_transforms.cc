@@ -31,9 +31,11 @@ class FrameKeys {
       : top_(top), frame_(frame), file_(file), where_(std::move(where)) {}
 
   const std::string& where() const { return where_; }
+  /// Where the key is found, or where it is missing.
   std::string where(const std::string& key) const {
-    const std::optional<std::size_t> entry = find_value(frame_, key) ? std::nullopt : node_entry(key);
-    return (entry ? file_ + ": nodes[" + std::to_string(*entry) + "]" : where_) + "." + key;
+    if (find_value(frame_, key)) return where_ + "." + key;
+    if (const auto entry = node_entry(key)) return file_ + ": nodes[" + std::to_string(*entry) + "]." + key;
+    return find_value(top_, key) ? file_ + ": " + key : where_ + "." + key;
   }
 
   const json* find(const std::string& key) const {

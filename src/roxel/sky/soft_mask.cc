@@ -218,7 +218,7 @@ class PixelMasking {
   /// Posterior of sky by the mean colour of the sky's pixels around.
   float likeness_to_sky_around(int x, int y) const {
     constexpr int kRadius = 1, kLeastCount = 2;
-    if (!may_be_sky(x, y)) return 0;
+    if (!may_be_sky(x, y) || clips(x, y)) return 0;  // what clips is like all that clips
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     int count = 0;
     for (int v = std::max(0, y - kRadius); v <= std::min(height_ - 1, y + kRadius); ++v)
