@@ -8,7 +8,7 @@ namespace roxel {
 namespace {
 
 constexpr int kPhotoSide = 100;  ///< pixels
-constexpr float kTau = 1;         ///< of the full volume: more opaque than not
+constexpr float kTau = 1;        ///< of the full volume: more opaque than not
 
 /// Masks of both views of one node.
 const std::vector<std::uint8_t> kFirst = {1, 1, 0, 0}, kSecond = {0, 0, 1, 1};
