@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "roxel/sky/sky_fit.h"
@@ -12,7 +13,7 @@ constexpr double kElsewhere = 1 / (3.9 * 1.4 * 1.4);
 /// this.
 constexpr double kLeastPixelSigma = 0.02, kMostPixelSigma = 0.1;
 constexpr int kReach = 8;                  ///< facets that a correction is carried
-constexpr float kDarkest = 1e-12f;         ///< of light whose logarithm is taken
+constexpr double kDarkest = 1e-12;         ///< of light that others are compared with
 constexpr double kAsGoodAsClipped = 0.75;  ///< of the clip level, for a model
 
 /// 0 where there are none.
@@ -175,9 +176,6 @@ class PixelMasking {
   /// low in gaps between houses, and in clouds.
   void follow() {
     if (!fit_.fitted.has_light()) return;
-    logarithms_ = Image(width_, height_, 3);
-    for (std::size_t i = 0; i < logarithms_.data().size(); ++i)
-      logarithms_.data()[i] = std::log(std::max(picture_.rgb.data()[i], kDarkest));
     find_noise();
     std::vector<std::size_t> queue;
     std::vector<std::uint8_t> waits(likeness_.size(), 0);
@@ -202,31 +200,42 @@ class PixelMasking {
     }
   }
 
-  /// What pixels of the sky that lie side by side differ by, as a deviation of each: the median.
+  /// What pixels of the sky that lie side by side differ by, as a deviation of each: the median, over rows
+  /// enough.
   void find_noise() {
-    for (int c = 0; c < 3; ++c) {
-      std::vector<float> differences;
-      for (int y = 0; y < height_; ++y)
-        for (int x = 1; x < width_; ++x)
-          if (is_sky(at(x, y)) && is_sky(at(x - 1, y)))
-            differences.push_back(std::abs(logarithms_.pixel(x, y)[c] - logarithms_.pixel(x - 1, y)[c]));
-      constexpr double kDeviation = 1.0484;  // of each, for a median of 1 of Gaussians' absolute difference
-      noise_[c] = std::clamp(kDeviation * median(differences), kLeastPixelSigma, kMostPixelSigma);
-    }
+    constexpr int kMostRows = 256;
+    constexpr double kDeviation = 1.0484;  // of each, for a median of 1 of Gaussians' absolute difference
+    const int stride = std::max(1, height_ / kMostRows);
+    std::array<std::vector<double>, 3> differences;
+    for (int y = 0; y < height_; y += stride)
+      for (int x = 1; x < width_; ++x) {
+        if (!is_sky(at(x, y)) || !is_sky(at(x - 1, y))) continue;
+        const Eigen::Vector3d apart = relative_to(light(x, y), light(x - 1, y));
+        for (int c = 0; c < 3; ++c) differences[c].push_back(std::abs(apart[c]));
+      }
+    for (int c = 0; c < 3; ++c)
+      noise_[c] = std::clamp(kDeviation * median(differences[c]), kLeastPixelSigma, kMostPixelSigma);
+  }
+
+  Eigen::Vector3d light(int x, int y) const {
+    return Eigen::Vector3f(picture_.rgb.pixel(x, y)).cast<double>();
+  }
+  /// Nearly the difference of logarithms where that is small.
+  static Eigen::Vector3d relative_to(const Eigen::Vector3d& light, const Eigen::Vector3d& other) {
+    return ((light - other).array() / other.array().max(kDarkest)).matrix();
   }
 
   /// Posterior of sky by the mean colour of the sky's pixels around.
   float likeness_to_sky_around(int x, int y) const {
     constexpr int kRadius = 1, kLeastCount = 2;
     if (!may_be_sky(x, y) || clips(x, y)) return 0;  // what clips is like all that clips
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int count = 0;
     for (int v = std::max(0, y - kRadius); v <= std::min(height_ - 1, y + kRadius); ++v)
       for (int u = std::max(0, x - kRadius); u <= std::min(width_ - 1, x + kRadius); ++u)
-        if (is_sky(at(u, v))) sum += Eigen::Vector3f(logarithms_.pixel(u, v)), ++count;
+        if (is_sky(at(u, v))) sum += light(u, v), ++count;
     if (count < kLeastCount) return 0;
-    const Eigen::Vector3f error = Eigen::Vector3f(logarithms_.pixel(x, y)) - sum / static_cast<float>(count);
-    return posterior(error.cast<double>(), noise_);
+    return posterior(relative_to(light(x, y), sum / count), noise_);
   }
 
   const SkyPicture& picture_;
@@ -237,8 +246,7 @@ class PixelMasking {
   std::vector<float> likeness_;
   std::vector<int> facet_;
   std::vector<std::uint8_t> reached_;
-  Image logarithms_;                                 ///< of the picture
-  Eigen::Vector3d noise_ = Eigen::Vector3d::Zero();  ///< of logarithms
+  Eigen::Vector3d noise_ = Eigen::Vector3d::Zero();  ///< relative
 };
 
 }  // namespace
