@@ -121,6 +121,24 @@ TEST(FitSky, SkyIsFollowedDownAGapAsFarAsItChangesBitByBit) {
   }
 }
 
+// What darkens bit by bit may be a blurred outline: a mask follows it no further than to a third.
+TEST(FitSky, SkyIsNotFollowedIntoTheDark) {
+  Square square;
+  square.roof_deg = 25;
+  SkyPicture picture = panorama_of(clear_sky(), square);
+  const NodeSky sky = clear_sky();
+  constexpr int kTop = 65;
+  for (int y = kTop; y < 90; ++y)
+    for (int x = 20; x < 28; ++x) {
+      const Eigen::Vector3d light = sky.radiance_in_sky(picture.rays.direction(x + 0.5, y + 0.5));
+      for (int c = 0; c < 3; ++c)
+        picture.rgb.pixel(x, y)[c] = static_cast<float>(std::exp(-0.05 * (y - kTop)) * light[c]);
+    }
+  const Mask mask = soft_sky_mask(picture, fit_one(picture));
+  EXPECT_GT(mask.at(24, kTop + 18), 200);  // 0.41 of the sky
+  EXPECT_EQ(mask.at(24, 89), 0);           // 0.30
+}
+
 TEST(FitSky, TheSunsRegionOverridesTheMasks) {
   const NodeSky truth = clear_sky();
   const SkyPicture picture = panorama_of(truth, {});

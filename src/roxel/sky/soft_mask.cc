@@ -15,6 +15,8 @@ constexpr double kLeastPixelSigma = 0.02, kMostPixelSigma = 0.1;
 constexpr int kReach = 8;                  ///< facets that a correction is carried
 constexpr double kDarkest = 1e-12;         ///< of light that others are compared with
 constexpr double kAsGoodAsClipped = 0.75;  ///< of the clip level, for a model
+constexpr double kMostStep = 0.04;         ///< deviation of pixels side by side, for a mask to be followed
+constexpr double kDarkestSky = 1.0 / 3, kBrightestSky = 4;  ///< of the model: as far as masks are followed
 
 /// 0 where there are none.
 template <class Number>
@@ -209,12 +211,12 @@ class PixelMasking {
     std::array<std::vector<double>, 3> differences;
     for (int y = 0; y < height_; y += stride)
       for (int x = 1; x < width_; ++x) {
-        if (!is_sky(at(x, y)) || !is_sky(at(x - 1, y))) continue;
+        if (!is_sky(at(x, y)) || !is_sky(at(x - 1, y)) || clips(x, y) || clips(x - 1, y)) continue;
         const Eigen::Vector3d apart = relative_to(light(x, y), light(x - 1, y));
         for (int c = 0; c < 3; ++c) differences[c].push_back(std::abs(apart[c]));
       }
     for (int c = 0; c < 3; ++c)
-      noise_[c] = std::clamp(kDeviation * median(differences[c]), kLeastPixelSigma, kMostPixelSigma);
+      noise_[c] = std::clamp(kDeviation * median(differences[c]), kLeastPixelSigma, kMostStep);
   }
 
   Eigen::Vector3d light(int x, int y) const {
@@ -235,6 +237,9 @@ class PixelMasking {
       for (int u = std::max(0, x - kRadius); u <= std::min(width_ - 1, x + kRadius); ++u)
         if (is_sky(at(u, v))) sum += light(u, v), ++count;
     if (count < kLeastCount) return 0;
+    const double model = luminance(fit_.fitted.radiance_in_sky(picture_.rays.direction(x + 0.5, y + 0.5)));
+    const double own = luminance(light(x, y));
+    if (!(own >= kDarkestSky * model && own <= kBrightestSky * model)) return 0;
     return posterior(relative_to(light(x, y), sum / count), noise_);
   }
 

@@ -28,7 +28,7 @@ class SkyShare {
       for (int x = 0; x < width_; ++x) {
         const std::size_t i = static_cast<std::size_t>(y) * width_ + x;
         const bool seen = photo.valid.empty() || photo.valid.data()[i] == 255;  // not beyond the lens
-        if (seen) row += photo.sky.data()[i] >> kDroppedBits;
+        if (seen) row += in_fifteenths(photo.sky.data()[i]);
         at(x + 1, y + 1) = at(x + 1, y) + row;
       }
     }
@@ -47,9 +47,9 @@ class SkyShare {
   bool has(const Eigen::Vector2d& pixel) const { return inside(pixel) == pixel; }
 
  private:
-  /// Four bits of a mask's eight are enough, and their sums fit for 2^28 pixels.
-  static constexpr int kDroppedBits = 4;
-  static constexpr double kFull = 255 >> kDroppedBits;
+  /// Enough, and sums of them fit for 2^28 pixels.
+  static constexpr std::uint32_t kFull = 15;
+  static std::uint32_t in_fifteenths(std::uint8_t mask) { return (kFull * mask + 127) / 255; }
 
   Eigen::Vector2d inside(const Eigen::Vector2d& pixel) const {
     return pixel.cwiseMax(0).cwiseMin(Eigen::Vector2d(width_, height_));

@@ -237,8 +237,9 @@ void add_background(OptionTable<Options>& table) {
       .source("[Jethwa04] appendix B, -fc");
   table.add("empty-sky", &Options::empty_sky)
       .help(
-          "Where masks of skies are the background: after each level, empty what photographs show as sky "
-          "and nothing but sky, those of two nodes where it is opaque")
+          "Where masks of skies are the background: after each level, empty voxels whose footprint is nearly "
+          "all "
+          "sky in a photograph, or in those of two nodes where they are more opaque than not")
       .source("[Kutulakos00]; docs/light.md");
   table.add("filter-background", &Options::filter_background)
       .help("Remove a known background's share from samples")
