@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "roxel/base/angles.h"
 #include "roxel/sky/sky_fit.h"
 
 namespace roxel {
@@ -15,7 +16,9 @@ constexpr double kLeastPixelSigma = 0.02, kMostPixelSigma = 0.1;
 constexpr int kReach = 8;                  ///< facets that a correction is carried
 constexpr double kDarkest = 1e-12;         ///< of light that others are compared with
 constexpr double kAsGoodAsClipped = 0.75;  ///< of the clip level, for a model
-constexpr double kMostStep = 0.04;         ///< deviation of pixels side by side, for a mask to be followed
+constexpr double kFollowedStep =
+    0.2 * kDegree;                  ///< between pixels that are compared where masks are followed
+constexpr double kMostStep = 0.04;  ///< deviation of such pixels
 constexpr double kDarkestSky = 1.0 / 3, kBrightestSky = 4;  ///< of the model: as far as masks are followed
 
 /// 0 where there are none.
@@ -178,6 +181,10 @@ class PixelMasking {
   /// low in gaps between houses, and in clouds.
   void follow() {
     if (!fit_.fitted.has_light()) return;
+    const double pixel =
+        std::acos(std::min(1.0, picture_.rays.direction(0.5 * width_, 0.5 * height_)
+                                    .dot(picture_.rays.direction(0.5 * width_ + 1, 0.5 * height_))));
+    step_ = std::max(1, static_cast<int>(std::lround(kFollowedStep / std::max(pixel, 1e-6))));
     find_noise();
     std::vector<std::size_t> queue;
     std::vector<std::uint8_t> waits(likeness_.size(), 0);
@@ -202,7 +209,7 @@ class PixelMasking {
     }
   }
 
-  /// What pixels of the sky that lie side by side differ by, as a deviation of each: the median, over rows
+  /// What pixels of the sky a step apart differ by, as a deviation of each: the median, over rows
   /// enough.
   void find_noise() {
     constexpr int kMostRows = 256;
@@ -210,9 +217,9 @@ class PixelMasking {
     const int stride = std::max(1, height_ / kMostRows);
     std::array<std::vector<double>, 3> differences;
     for (int y = 0; y < height_; y += stride)
-      for (int x = 1; x < width_; ++x) {
-        if (!is_sky(at(x, y)) || !is_sky(at(x - 1, y)) || clips(x, y) || clips(x - 1, y)) continue;
-        const Eigen::Vector3d apart = relative_to(light(x, y), light(x - 1, y));
+      for (int x = step_; x < width_; ++x) {
+        if (!is_sky(at(x, y)) || !is_sky(at(x - step_, y)) || clips(x, y) || clips(x - step_, y)) continue;
+        const Eigen::Vector3d apart = relative_to(light(x, y), light(x - step_, y));
         for (int c = 0; c < 3; ++c) differences[c].push_back(std::abs(apart[c]));
       }
     for (int c = 0; c < 3; ++c)
@@ -227,15 +234,16 @@ class PixelMasking {
     return ((light - other).array() / other.array().max(kDarkest)).matrix();
   }
 
-  /// Posterior of sky by the mean colour of the sky's pixels around.
+  /// Posterior of sky by the mean colour of the sky's pixels around, a step away: nearer ones lead up a
+  /// blurred outline bit by bit.
   float likeness_to_sky_around(int x, int y) const {
-    constexpr int kRadius = 1, kLeastCount = 2;
+    constexpr int kLeastCount = 2;
     if (!may_be_sky(x, y) || clips(x, y)) return 0;  // what clips is like all that clips
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int count = 0;
-    for (int v = std::max(0, y - kRadius); v <= std::min(height_ - 1, y + kRadius); ++v)
-      for (int u = std::max(0, x - kRadius); u <= std::min(width_ - 1, x + kRadius); ++u)
-        if (is_sky(at(u, v))) sum += light(u, v), ++count;
+    for (int v = y - step_; v <= y + step_; v += step_)
+      for (int u = x - step_; u <= x + step_; u += step_)
+        if (u >= 0 && v >= 0 && u < width_ && v < height_ && is_sky(at(u, v))) sum += light(u, v), ++count;
     if (count < kLeastCount) return 0;
     const double model = luminance(fit_.fitted.radiance_in_sky(picture_.rays.direction(x + 0.5, y + 0.5)));
     const double own = luminance(light(x, y));
@@ -251,6 +259,7 @@ class PixelMasking {
   std::vector<float> likeness_;
   std::vector<int> facet_;
   std::vector<std::uint8_t> reached_;
+  int step_ = 1;                                     ///< pixels
   Eigen::Vector3d noise_ = Eigen::Vector3d::Zero();  ///< relative
 };
 
