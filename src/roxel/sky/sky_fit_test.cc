@@ -139,6 +139,33 @@ TEST(FitSky, SkyIsNotFollowedIntoTheDark) {
   EXPECT_EQ(mask.at(24, 89), 0);           // 0.30
 }
 
+// A large photograph, pixels of 0.02 degrees, of the edge of a smooth wall that is nearly as bright as the
+// sky, blurred over ten of them: bit by bit it leads into the wall.
+TEST(FitSky, ABlurredOutlineOfALargePhotographIsNoWayIntoAWall) {
+  const NodeSky sky = clear_sky();
+  const SkyFit fit = fit_one(panorama_of(sky, {}));
+  PinholeCamera camera;
+  constexpr int kSide = 240;
+  constexpr double kFocal = kSide / 0.084;
+  camera.intrinsics = {kSide, kSide, kFocal, kFocal, kSide / 2.0, kSide / 2.0, 0};
+  const double edge = 17 * kDegree;
+  camera.pose.rotation << 1, 0, 0, 0, std::sin(edge), -std::cos(edge), 0, std::cos(edge), std::sin(edge);
+  SkyPicture picture{Image(kSide, kSide, 3), {}, {}, PixelRays(camera, Eigen::Matrix3d::Identity())};
+  ASSERT_NEAR(picture.rays.pixel_angle() / kDegree, 0.02, 0.001);
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const Eigen::Vector3d direction = picture.rays.direction(x + 0.5, y + 0.5);
+      const double up = (std::asin(direction.z()) - edge) / kDegree;
+      const double open = 1 / (1 + std::exp(-up / 0.04));
+      const Eigen::Vector3d light = sky.radiance_in_sky(direction);
+      for (int c = 0; c < 3; ++c)
+        picture.rgb.pixel(x, y)[c] = static_cast<float>(open * light[c] + (1 - open) * 0.8 * light[2 - c]);
+    }
+  const Mask mask = soft_sky_mask(picture, fit);
+  EXPECT_GT(mask.at(kSide / 2, 20), 200);
+  for (int y = kSide / 2 + 20; y < kSide; ++y) EXPECT_EQ(mask.at(kSide / 2, y), 0) << y;
+}
+
 TEST(FitSky, TheSunsRegionOverridesTheMasks) {
   const NodeSky truth = clear_sky();
   const SkyPicture picture = panorama_of(truth, {});

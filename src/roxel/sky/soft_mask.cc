@@ -181,10 +181,7 @@ class PixelMasking {
   /// low in gaps between houses, and in clouds.
   void follow() {
     if (!fit_.fitted.has_light()) return;
-    const double pixel =
-        std::acos(std::min(1.0, picture_.rays.direction(0.5 * width_, 0.5 * height_)
-                                    .dot(picture_.rays.direction(0.5 * width_ + 1, 0.5 * height_))));
-    step_ = std::max(1, static_cast<int>(std::lround(kFollowedStep / std::max(pixel, 1e-6))));
+    step_ = std::max(1, static_cast<int>(std::lround(kFollowedStep / picture_.rays.pixel_angle())));
     find_noise();
     std::vector<std::size_t> queue;
     std::vector<std::uint8_t> waits(likeness_.size(), 0);
