@@ -140,7 +140,7 @@ TEST(FitSky, SkyIsNotFollowedIntoTheDark) {
 }
 
 // A large photograph, pixels of 0.02 degrees, of the edge of a smooth wall that is nearly as bright as the
-// sky, blurred over ten of them: bit by bit it leads into the wall.
+// sky, blurred over twenty of them: bit by bit it leads into the wall.
 TEST(FitSky, ABlurredOutlineOfALargePhotographIsNoWayIntoAWall) {
   const NodeSky sky = clear_sky();
   const SkyFit fit = fit_one(panorama_of(sky, {}));
@@ -156,7 +156,7 @@ TEST(FitSky, ABlurredOutlineOfALargePhotographIsNoWayIntoAWall) {
     for (int x = 0; x < kSide; ++x) {
       const Eigen::Vector3d direction = picture.rays.direction(x + 0.5, y + 0.5);
       const double up = (std::asin(direction.z()) - edge) / kDegree;
-      const double open = 1 / (1 + std::exp(-up / 0.04));
+      const double open = 1 / (1 + std::exp(-up / 0.08));
       const Eigen::Vector3d light = sky.radiance_in_sky(direction);
       for (int c = 0; c < 3; ++c)
         picture.rgb.pixel(x, y)[c] = static_cast<float>(open * light[c] + (1 - open) * 0.8 * light[2 - c]);
