@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "roxel/base/error.h"
+#include "roxel/base/median.h"
 
 namespace roxel {
 namespace {
@@ -109,9 +110,8 @@ class LatticeBuilder {
         if (y + 1 < height_) add(i, i + width_, step(field_.down_step, i));
       }
     if (differences.empty()) return 1;
-    const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-    std::nth_element(differences.begin(), middle, differences.end());
-    return std::max(kMedianToSigma * *middle, 1e-5 * depth_sum / static_cast<double>(differences.size()));
+    return std::max(kMedianToSigma * median(differences),
+                    1e-5 * depth_sum / static_cast<double>(differences.size()));
   }
 
   float tie(std::size_t a, std::size_t b, float expected) const {
@@ -162,9 +162,7 @@ int plane_radius(const Image& depth, double focal_px, double voxel_size) {
   for (const float z : depth.data())
     if (z > 0) depths.push_back(z);
   if (depths.empty()) return 2;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return static_cast<int>(std::clamp(std::lround(1.5 * voxel_size * focal_px / *middle), 2l, 6l));
+  return static_cast<int>(std::clamp(std::lround(1.5 * voxel_size * focal_px / median(depths)), 2l, 6l));
 }
 
 PropagationFigures propagate_depth(DepthLayers& layers, const PropagationGuide& guide,

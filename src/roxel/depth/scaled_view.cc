@@ -1,4 +1,5 @@
 #include "roxel/depth/scaled_view.h"
+#include "roxel/base/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,13 +12,6 @@ constexpr double kLeastVoxel = 1.5;  ///< pixels: what refinement was measured a
 constexpr double kLeastPixels = 100e3;  ///< of a view that was made smaller
 constexpr int kMostScale = 16;
 constexpr int kDepthStride = 8;  ///< pixels between depths whose median is taken
-
-double median(std::vector<double>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

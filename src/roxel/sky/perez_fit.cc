@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "roxel/base/error.h"
+#include "roxel/base/median.h"
 
 namespace roxel {
 namespace {
@@ -72,10 +73,7 @@ double scale_of(const PerezShape& shape, const std::vector<Seen>& seen) {
   std::vector<double> ratios;
   for (const Seen& s : seen)
     if (const double f = relative(shape, s); f > 1e-9) ratios.push_back(s.radiance / f);
-  if (ratios.empty()) return 1;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return ratios.empty() ? 1 : median(ratios);
 }
 
 double mean_error(const PerezChannel& channel, const std::vector<Seen>& seen) {

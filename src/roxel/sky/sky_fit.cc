@@ -5,6 +5,7 @@
 
 #include "roxel/base/angles.h"
 #include "roxel/base/formatted.h"
+#include "roxel/base/median.h"
 #include "roxel/sky/perez_fit.h"
 #include "roxel/sky/sun_search.h"
 
@@ -270,9 +271,7 @@ class Fitting {
     for (int c = 0; c < 3; ++c) {
       std::vector<double> errors;
       for (const SkySample& s : seen) errors.push_back(std::abs(log_ratio(s.direction, s.radiance)[c]));
-      const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-      std::nth_element(errors.begin(), middle, errors.end());
-      sky().relative_sigma[c] = std::clamp(1.4826 * *middle, kLeastSigma, kMostSigma);
+      sky().relative_sigma[c] = std::clamp(1.4826 * median(errors), kLeastSigma, kMostSigma);
     }
   }
 

@@ -9,6 +9,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
+#include "roxel/base/median.h"
 
 namespace roxel {
 namespace {
@@ -157,9 +158,7 @@ double node_spacing(const Dataset& dataset, const Node& node, const Halves& halv
   for (std::size_t i = 0; i < places.size(); ++i)
     for (std::size_t j = 0; j < places.size(); ++j)
       if (j != i) nearest[i] = std::min(nearest[i], (places[i] - places[j]).norm());
-  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
-  std::nth_element(nearest.begin(), middle, nearest.end());
-  return *middle;
+  return median(nearest);
 }
 
 /// A node's name may be a loose label; but cameras in two places, each small beside the gap between them, are

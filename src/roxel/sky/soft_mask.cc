@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "roxel/base/angles.h"
+#include "roxel/base/median.h"
 #include "roxel/sky/sky_fit.h"
 
 namespace roxel {
@@ -20,15 +21,6 @@ constexpr double kFollowedStep =
     0.2 * kDegree;                  ///< between pixels that are compared where masks are followed
 constexpr double kMostStep = 0.04;  ///< deviation of such pixels
 constexpr double kDarkestSky = 1.0 / 3, kBrightestSky = 4;  ///< of the model: as far as masks are followed
-
-/// 0 where there are none.
-template <class Number>
-double median(std::vector<Number>& numbers) {
-  if (numbers.empty()) return 0;
-  const auto middle = numbers.begin() + static_cast<std::ptrdiff_t>(numbers.size() / 2);
-  std::nth_element(numbers.begin(), middle, numbers.end());
-  return *middle;
-}
 
 /// Of sky, for errors of a logarithm of each channel and their deviations.
 float posterior(const Eigen::Vector3d& error, const Eigen::Vector3d& sigma) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "roxel/base/angles.h"
+#include "roxel/base/median.h"
 
 namespace roxel {
 namespace {
@@ -24,10 +25,7 @@ double median_luminance(const SphereLight& light) {
   for (std::size_t f = 0; f < light.facets.size(); ++f)
     if (light.facets[f].weight > 0 && light.sphere->centre(static_cast<int>(f)).z() > 0)
       values.push_back(luminance(light.facets[f].mean));
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median(values);
 }
 
 bool is_clipped(const FacetLight& facet) { return facet.clipped > facet.weight; }

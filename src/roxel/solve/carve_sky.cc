@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
 #include "roxel/base/parallel.h"
 
@@ -74,26 +73,32 @@ struct SkyView {
   PinholeCamera camera;
   SkyShare sky;
 
-  /// The rectangle around a cube's corners; nothing where the camera is within it or beyond.
-  std::optional<Eigen::AlignedBox2d> footprint(const Eigen::Vector3d& centre, double side) const {
-    Eigen::AlignedBox2d pixels;
+  struct Footprint {
+    Eigen::AlignedBox2d pixels;  ///< the rectangle around the corners before the camera
+    int behind = 0;              ///< corners that are not before it
+  };
+  Footprint footprint(const Eigen::Vector3d& centre, double side) const {
+    Footprint print;
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3d off(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5);
       const Eigen::Vector3d seen = camera.project(centre + side * off);
-      if (!(seen.z() > 0)) return {};
-      pixels.extend(Eigen::Vector2d(seen.head<2>()));
+      if (seen.z() > 0)
+        print.pixels.extend(Eigen::Vector2d(seen.head<2>()));
+      else
+        ++print.behind;
     }
-    return pixels;
+    return print;
   }
 
   bool is_before_sky(const Eigen::Vector3d& centre, double side) const {
-    const auto pixels = footprint(centre, side);
-    return pixels && sky.has(camera.project(centre).head<2>()) && sky.within(*pixels) >= kNearlyAll;
+    const Footprint print = footprint(centre, side);
+    return print.behind == 0 && sky.has(camera.project(centre).head<2>()) &&
+           sky.within(print.pixels) >= kNearlyAll;
   }
   /// Whether no part of a cube is.
   bool has_no_sky(const Eigen::Vector3d& centre, double side) const {
-    const auto pixels = footprint(centre, side);
-    return pixels && sky.within(*pixels) == 0;
+    const Footprint print = footprint(centre, side);
+    return print.behind == 8 || (print.behind == 0 && sky.within(print.pixels) == 0);
   }
 };
 
