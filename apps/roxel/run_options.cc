@@ -27,7 +27,9 @@ OptionTable<StageSwitches> make_stage_table() {
       .placeholder("DIR")
       .unset("found from variance, colour and luminance");
   table.add("sky-again", &StageSwitches::sky_again)
-      .help("After the first level, fit skies again with the rays that the volume leaves unexplained")
+      .help(
+          "After the first level, fit skies that this run fits again, with the rays that the volume leaves "
+          "unexplained")
       .source("[Jethwa04] section 7.2.2");
   table.add("dry-run", &StageSwitches::dry_run)
       .help("Say what would be done, and what memory and time it would take");

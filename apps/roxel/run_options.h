@@ -20,7 +20,7 @@ struct StageSwitches {
   std::optional<std::string> sky;
   std::optional<std::array<double, 2>> sun;
   std::optional<std::string> sky_masks;
-  bool sky_again = false;
+  bool sky_again = true;
   bool dry_run = false;
   bool depth = true;
   bool render = true;

@@ -54,12 +54,12 @@ void RunSkies::check_sky_options(bool fitted) const {
 }
 
 void RunSkies::warn_if_idle(bool fitted) {
-  if (!options_.stages.sky_again) return;
+  if (options_.stages.sky_again) return;
   const char* why = options_.stages.sky                ? "skies are taken from --sky RUN as they are"
                     : !fitted                          ? "no skies are fitted in this run; see --illumination"
                     : options_.reconstruct.levels == 1 ? "there is but one level; see --levels"
                                                        : nullptr;
-  if (why) input_.dataset.warnings.push_back(std::string("--sky-again has no effect here: ") + why);
+  if (why) input_.dataset.warnings.push_back(std::string("--no-sky-again has no effect here: ") + why);
 }
 
 SkyOptions RunSkies::sky_options() const {

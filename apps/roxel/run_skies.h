@@ -27,7 +27,7 @@ class RunSkies {
  private:
   /// What says how skies are fitted does nothing where none is.
   void check_sky_options(bool fitted) const;
-  /// Says so where --sky-again does nothing.
+  /// Says so where --no-sky-again does nothing.
   void warn_if_idle(bool fitted);
   SkyOptions sky_options() const;
   /// Fits the skies. Where they were not asked for, the light of half of the photographs must turn out to be

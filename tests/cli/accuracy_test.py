@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""What `roxel` reaches on ray-traced worlds with known depth and surface: figures below which it must not fall. All but Worlds
-need the data sets plane, head and courtyard, in the folder that the environment variable ROXEL_TEST_DATA names or in a folder shared/data above this one.
+"""What `roxel` reaches on ray-traced worlds with known depth and surface, and on photographs that were left out: figures
+below which it must not fall. All but Worlds need the data sets plane, head, courtyard and statue-of-liberty, in the folder
+that the environment variable ROXEL_TEST_DATA names or in a folder shared/data above this one. What takes minutes runs only
+where ROXEL_LONG_TESTS is set.
 
     accuracy_test.py ROXEL [unittest arguments, e.g. Plane]
 """
@@ -21,6 +23,19 @@ def data_set(name):
     return next((folder / name for folder in folders if (folder / name).is_dir()), None)
 
 
+def present(name):
+    """A data set's folder. Where it is absent tests are skipped."""
+    folder = data_set(name) if name else None
+    if folder is None:
+        raise unittest.SkipTest(f"test data \"{name}\" is not here; set ROXEL_TEST_DATA to its folder")
+    return folder
+
+
+def skip_unless_long():
+    if not os.environ.get("ROXEL_LONG_TESTS"):
+        raise unittest.SkipTest("takes minutes; set ROXEL_LONG_TESTS=1")
+
+
 def check_voxels(case, volume, opacity, within_4, covered):
     """Least distance-weighted mean opacity, shares of voxels near the surface and of the surface near one, in percent."""
     case.assertGreaterEqual(100 * volume["weighted_mean_opacity"], opacity)
@@ -35,16 +50,15 @@ class AccuracyCase(program.Case):
     bounds = None
     diagonal = None  # of the bounds, world units
     options = ["--voxel-size", "0.02", "--texture", "none", "--no-mesh-pictures"]
+    measures = ["--opacity-threshold", "0.3"]
 
     @classmethod
     def setUpClass(cls):
-        data = data_set(cls.name) if cls.name else None
-        if data is None:
-            raise unittest.SkipTest(f"test data \"{cls.name}\" is not here; set ROXEL_TEST_DATA to its folder")
+        data = present(cls.name)
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="roxel-accuracy-"))
         out = cls.folder / "run"
         for command in (["reconstruct", data, "-o", out, f"--bounds={cls.bounds}", *cls.options, "--no-report", "--quiet"],
-                        ["eval", out, "--truth", data, "-o", cls.folder / "metrics", "--opacity-threshold", "0.3", "--quiet"]):
+                        ["eval", out, "--truth", data, "-o", cls.folder / "metrics", *cls.measures, "--quiet"]):
             done = program.run(*command, timeout=1000)
             assert done.returncode == 0, done.stderr
         cls.metrics = json.loads((cls.folder / "metrics/metrics.json").read_text())
@@ -124,7 +138,7 @@ class Worlds(Case):
 
 
 class Courtyard(AccuracyCase):
-    """Three of its eight nodes, at coarse voxels and without refinement: all of it, at half a metre, takes minutes."""
+    """Three of its eight nodes, at coarse voxels and without refinement."""
 
     name, bounds, diagonal = "courtyard", "-36,-32,-0.5,36,33,28", 101.04
     options = ["--nodes", "0:3", "--voxel-size", "1", "--illumination", "sky-normal", "--matching", "local", "--no-refine", "--no-mesh"]
@@ -155,14 +169,46 @@ class Courtyard(AccuracyCase):
         self.assertLess(opaque["above_all"]["share"], 0.001)
 
 
+class CourtyardAtHalfAMetre(AccuracyCase):
+    """All eight nodes with the skies that the run finds, voxels of half a metre."""
+
+    name, bounds = "courtyard", "-36,-32,-0.5,36,33,28"
+    options = ["--voxel-size", "0.5", "--masks", "none", "--illumination", "sky", "--matching", "local", "--no-bp", "--no-refine", "--no-mesh"]
+    measures = ["--distances", "0.5,1", "--depth-within", "0.5,1,2"]
+
+    @classmethod
+    def setUpClass(cls):
+        skip_unless_long()
+        super().setUpClass()
+
+    def test_depth_keeps_to_its_targets(self):
+        shares = self.metrics["depth"]["share_within_units"]
+        self.assertGreaterEqual(shares["0.5"], 0.40)
+        self.assertGreaterEqual(shares["2"], 0.72)
+
+    def test_depth_points_keep_to_their_targets(self):
+        by_pixel = next(s for s in self.metrics["surfaces"] if s["name"] == "depth points by pixel")["within"]
+        found = {entry["distance"]: entry["f_score"] for entry in by_pixel}
+        self.assertGreaterEqual(found[0.5], 0.72)
+        self.assertGreaterEqual(found[1], 0.86)
+
+    def test_no_sky_is_built(self):
+        for voxels in self.metrics["sky_debris"]:
+            with self.subTest(voxels["opacity_threshold"]):
+                for where in ("above_all", "before_sky"): self.assertLess(voxels[where]["share"], 0.001)
+
+    def test_the_second_look_at_the_skies_is_on_record(self):
+        summary = json.loads((self.folder / "run/summary.json").read_text())
+        self.assertEqual([sky["node"] for sky in summary["skies_again"]], [sky["node"] for sky in summary["skies"]])
+        for sky in summary["skies_again"]: self.assertGreater(sky["unexplained_share"], 0.2)
+
+
 class CourtyardSkies(Case):
     """All eight nodes, against the true domes, suns and masks."""
 
     @classmethod
     def setUpClass(cls):
-        data = data_set("courtyard")
-        if data is None:
-            raise unittest.SkipTest("test data \"courtyard\" is not here; set ROXEL_TEST_DATA to its folder")
+        data = present("courtyard")
         super().setUpClass()
         run = cls.folder / "skies"
         for command in (["sky", data, "-o", run, "--no-pictures", "--quiet"], ["eval", run, "--truth", data, "-o", cls.folder / "metrics", "--quiet"]):
@@ -183,6 +229,32 @@ class CourtyardSkies(Case):
         found = [sky["found_sun_error_deg"] for sky in self.skies if sky["found_sun_error_deg"] is not None]
         self.assertGreaterEqual(len(found), 5)
         for error in found: self.assertLessEqual(error, 2)
+
+
+class Statue(Case):
+    """Internet photographs, of which every 8th is left out."""
+
+    @classmethod
+    def setUpClass(cls):
+        skip_unless_long()
+        super().setUpClass()
+
+    def test_gains_are_worth_a_fifth_of_the_error_of_photographs_left_out(self):
+        given, data = present("statue-of-liberty"), self.folder / "statue"
+        data.mkdir()
+        for folder in ("images", "masks"): (data / folder).symlink_to(given / folder)
+        all_of_it = json.loads((given / "transforms.json").read_text())
+        for file, kept in (("transforms.json", lambda number: number % 8), ("transforms_test.json", lambda number: number % 8 == 0)):
+            frames = [frame for number, frame in enumerate(all_of_it["frames"], 1) if kept(number)]
+            (data / file).write_text(json.dumps(dict(all_of_it, frames=frames)))
+        rms = {}
+        for light in ("none", "gain"):
+            run, metrics = self.folder / light, self.folder / f"{light}-metrics"
+            self.succeed("reconstruct", data, "-o", run, "--bounds=0.2,-1.15,-0.45,1.05,1.35,1.7", "--voxel-size", "0.012", "--illumination", light,
+                         "--no-mesh", "--no-depth", "--no-report", "--quiet")
+            self.succeed("eval", run, "--truth", data, "-o", metrics, "--quiet")
+            rms[light] = json.loads((metrics / "metrics.json").read_text())["held_out"]["object"]["rms"]
+        self.assertLessEqual(rms["gain"], 0.8 * rms["none"])
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 import json
 import math
 import os
+import re
 import struct
 import sys
 import unittest
@@ -441,19 +442,19 @@ class LightInReconstruct(SkyCase):
     """The same street: what its light is worth, and how it is found."""
 
     OFTEN = ["--levels", "2", "--passes", "5", "--all-passes", "--checkpoint-interval", "0"]  # a checkpoint after each of many passes
-    LOOK_AGAIN = [*OFTEN, "--illumination", "sky", "--sky-again"]
+    LOOK_AGAIN = [*OFTEN, "--illumination", "sky"]
 
     sky_options = ["--facets", "4"]
     setUpClass, reconstruct, lights = classmethod(set_up_street), reconstruct_street, lights_of_nodes
 
     def test_photographs_of_several_times_of_day_are_brought_to_one_light(self):
-        _, found = self.reconstruct_once("--sky-again")  # which does nothing in a single level
+        _, found = self.reconstruct_once()
         self.assertEqual(found["scene"]["light"]["illumination"], "sky")
         self.assertTrue(any("several times of day" in note for note in found["notes"]), found["notes"])
 
     def test_shading_and_shadow_are_divided_out_where_that_is_asked_for(self):
         skies = self.skies
-        flat, _ = self.reconstruct("flat", "--render", "--sky", skies, "--illumination", "sky")
+        flat, _ = self.reconstruct("flat", "--render", "--report", "--sky", skies, "--illumination", "sky")
         out, summary = self.reconstruct("shaded", "--render", "--sky", skies, "--illumination", "sky-normal", "--threads", "1")
         again, _ = self.reconstruct("shaded2", "--render", "--sky", skies, "--illumination", "sky-normal", "--threads", "3")
         self.assertEqual(summary["scene"]["light"]["illumination"], "sky-normal")
@@ -463,8 +464,11 @@ class LightInReconstruct(SkyCase):
         self.assertIn(f"light/{name}.exr", files_below(out))
         self.assertEqual(digest(out / f"light/{name}.exr"), digest(again / f"light/{name}.exr"))
         self.assertNotIn(f"light/{name}.exr", files_below(flat))
-        self.reconstruct("shaded", "--render", "--illumination", "none", *NO_SURROUND)
+        self.reconstruct("shaded", "--render", "--report", "--illumination", "none", *NO_SURROUND)
         self.assertNotIn(f"light/{name}.exr", files_below(out))
+        for run, captions in ((flat, ["photograph", "photograph over its light", "render"]), (out, ["photograph", "render"])):  # before and after
+            found = re.findall(f'alt="([^"]*) of {name}"', (run / "report.html").read_text())
+            self.assertEqual(found[:len(captions)], captions)
 
     def test_rays_that_the_volume_leaves_unexplained_feed_the_next_fit(self):
         _, looked = self.reconstruct_once(*self.LOOK_AGAIN)
@@ -477,7 +481,7 @@ class LightInReconstruct(SkyCase):
         data, cloud = clouded_street(self.street, self.folder / "clouded")
         self.assertGreater(sum(map(len, cloud.values())), 500)
         found = {}
-        for name, options in (("first", []), ("second", ["--sky-again"])):
+        for name, options in (("first", ["--no-sky-again"]), ("second", [])):
             out = self.folder / name
             self.succeed("reconstruct", data, "-o", out, *SMALL, "--levels", "2", "--passes", "4", "--depth", "--no-bp", "--no-refine",
                          "--no-mesh", "--illumination", "sky", *options)
@@ -497,8 +501,8 @@ class LightInReconstruct(SkyCase):
         for why, options in (("taken from --sky RUN", ["--sky", self.skies]), ("no skies are fitted", ["--illumination", "none", *NO_SURROUND]),
                              ("but one level", [])):
             with self.subTest(why):
-                _, summary = self.reconstruct_once("--sky-again", *options)
-                self.assertTrue(any(w.startswith("--sky-again has no effect here") and why in w for w in summary["warnings"]), summary["warnings"])
+                _, summary = self.reconstruct_once("--no-sky-again", *options)
+                self.assertTrue(any(w.startswith("--no-sky-again has no effect here") and why in w for w in summary["warnings"]), summary["warnings"])
 
     def test_a_killed_run_goes_on_with_its_light_and_the_skies_that_it_found(self):
         for name, arguments in (("again", self.LOOK_AGAIN),

@@ -31,12 +31,14 @@ class FacetSphere {
   const Eigen::Vector3d& centre(int facet) const { return facets_[facet].centre; }
   /// Steradians; all facets together are the whole sphere.
   double solid_angle(int facet) const { return facets_[facet].solid_angle; }
+  /// Of the planes through the edges, inwards; of no particular length.
+  const std::array<Eigen::Vector3d, 3>& normals(int facet) const { return facets_[facet].normals; }
   /// Across the edges.
   const std::array<int, 3>& neighbours(int facet) const { return facets_[facet].neighbours; }
 
  private:
   struct Facet {
-    std::array<Eigen::Vector3d, 3> corners, normals;  ///< normals of the planes through edges, inwards
+    std::array<Eigen::Vector3d, 3> corners, normals;
     Eigen::Vector3d centre;
     double solid_angle;
     std::array<int, 3> neighbours;

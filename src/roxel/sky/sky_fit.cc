@@ -26,6 +26,7 @@ constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 /// Clouds against walls, where a volume knows of neither: smooth, grey or blue, not much darker than the
 /// model.
 constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
+constexpr double kIslandOpen = 2.0 / 3;  ///< of the edge of a cloud that does not touch the sky of the fit
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
 /// Contrast of a spot that is a sun without glare: lamps and white walls have less. Not where white is 1,
@@ -389,6 +390,30 @@ class Fitting {
            bright > kCloudDarkest;
   }
 
+  /// Clouds with sharp edges: what of the smooth regions that a volume does not explain may be cloud, where
+  /// it explains little of what is around, either. A wall that it does not know has walls around that it
+  /// does.
+  std::vector<int> islands() const {
+    std::vector<int> found;
+    const auto belongs = [&](int f) { return out_.masks.sky[f] && may_be_cloud(f); };
+    std::vector<std::uint8_t> taken(out_.used.size());
+    for (int seed = 0; seed < sphere_->count(); ++seed) {
+      if (taken[seed] || !belongs(seed)) continue;
+      std::vector<int> island{seed};
+      taken[seed] = 1;
+      double around = 0, open = 0;
+      for (std::size_t i = 0; i < island.size(); ++i)
+        for (const int next : sphere_->neighbours(island[i])) {
+          if (!belongs(next))
+            ++around, open += is_open(out_.light.facets[next]);
+          else if (!taken[next])
+            taken[next] = 1, island.push_back(next);
+        }
+      if (open >= kIslandOpen * around) found.insert(found.end(), island.begin(), island.end());
+    }
+    return found;
+  }
+
   void find_beyond_model() {
     out_.beyond_model.assign(out_.used.size(), 0);
     if (!sky().has_light() || out_.masks.by_hand) return;
@@ -398,6 +423,7 @@ class Fitting {
         if (!out_.beyond_model[next] && may_be_cloud(next))
           out_.beyond_model[next] = 1, queue.push_back(next);
     };
+    for (const int f : islands()) out_.beyond_model[f] = 1, queue.push_back(f);
     for (int f = 0; f < sphere_->count(); ++f)
       if (out_.used[f]) spread(f);
     for (std::size_t i = 0; i < queue.size(); ++i) spread(queue[i]);

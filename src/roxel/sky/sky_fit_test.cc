@@ -278,6 +278,40 @@ TEST(FitSky, WhatAVolumeLeavesUnexplainedMayBeCloud) {
   EXPECT_GT(iou_after, 0.8);  // facets of 7 degrees lose the edges
 }
 
+/// Bright round clouds of one colour with sharp edges, and below each a smooth part of the wall, of that
+/// colour, too, that a volume lacks.
+SkyPicture with_sharp_clouds(Mask* surface) {
+  Square square;
+  square.disc = false;
+  SkyPicture picture = panorama_of(clear_sky(), square, surface);
+  picture.open = Mask(360, 180, 0);
+  for (int y = 0; y < 180; ++y)
+    for (int x = 0; x < 360; ++x) {
+      const bool sky = surface->at(x, y) < 128, hole = !sky && std::hypot(x % 60 - 30, y - 82) < 6;
+      if (sky || hole) picture.open.at(x, y) = 255;
+      if (hole || (sky && y > 12 && std::hypot(x % 60 - 30, y - 28) < 12))
+        for (int c = 0; c < 3; ++c) picture.rgb.pixel(x, y)[c] = 0.5f;
+    }
+  return picture;
+}
+
+TEST(FitSky, CloudsWithSharpEdgesAreSkyWhereAVolumeKnowsOfNothingAround) {
+  Mask surface;
+  const SkyPicture seen = with_sharp_clouds(&surface);
+  SkyPicture alone = seen;
+  alone.open = {};
+  SkyFitOptions options;
+  options.facet_level = 5;
+  EXPECT_LT(iou(soft_sky_mask(alone, fit_one(alone, options)), surface), 0.86);
+  const Mask mask = soft_sky_mask(seen, fit_one(seen, options));
+  EXPECT_GT(iou(mask, surface), 0.93);
+  for (int y = 0; y < 180; ++y)
+    for (int x = 0; x < 360; ++x)
+      if (surface.at(x, y) == 255 && seen.open.at(x, y) == 255) {
+        ASSERT_EQ(mask.at(x, y), 0) << "a hole in the wall: " << x << " " << y;
+      }
+}
+
 TEST(FitSky, WallsDoNotBecomeSkyBecauseAVolumeHasAHole) {
   Mask surface;
   SkyPicture picture = panorama_of(clear_sky(), {}, &surface);

@@ -6,50 +6,55 @@
 namespace roxel {
 
 SphereLightSum::SphereLightSum(std::shared_ptr<const FacetSphere> sphere)
-    : sphere_(std::move(sphere)), picture_(sphere_->count()), total_(sphere_->count()) {}
+    : sphere_(std::move(sphere)), picture_(sphere_->count()), total_(sphere_->count()), parts_(*sphere_) {}
 
 void SphereLightSum::add(const SkyPicture& picture) {
-  // Pixels that are not small beside a facet are divided, so that each part goes to the right one.
-  const double facet_angle = std::sqrt(2 * sphere_->solid_angle(0));
-  const int samples =
-      std::clamp(static_cast<int>(std::ceil(3 * picture.rays.pixel_angle() / facet_angle)), 1, 16);
-  for (int y = 0; y < picture.rays.height(); ++y)
+  const auto corners_of_row = [&](int y) {
+    std::vector<Eigen::Vector3d> corners;
+    for (int x = 0; x <= picture.rays.width(); ++x) corners.push_back(picture.rays.direction(x, y));
+    return corners;
+  };
+  std::vector<Eigen::Vector3d> above = corners_of_row(0);
+  for (int y = 0; y < picture.rays.height(); ++y) {
+    const std::vector<Eigen::Vector3d> below = corners_of_row(y + 1);
     for (int x = 0; x < picture.rays.width(); ++x)
-      if (picture.valid.empty() || picture.valid.at(x, y) == 255) add_pixel(picture, x, y, samples);
+      if (picture.valid.empty() || picture.valid.at(x, y) == 255)
+        add_pixel(picture, x, y, {above[x], above[x + 1], below[x + 1], below[x]});
+    above = below;
+  }
   ++pictures_;
   if (!picture.known_sky.empty()) ++masked_by_hand_;
   fold();
 }
 
-void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y, int samples) {
+void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y,
+                               const std::array<Eigen::Vector3d, 4>& corners) {
   const Eigen::Vector3d rgb = Eigen::Vector3f(picture.rgb.pixel(x, y)).cast<double>();
-  const double light = luminance(rgb), weight = picture.rays.solid_angle(x, y) / (samples * samples);
+  const double light = luminance(rgb), solid_angle = picture.rays.solid_angle(x, y);
   const bool clipped = rgb.maxCoeff() >= picture.clip;
   const double open = picture.open.empty() ? 0 : picture.open.at(x, y) / 255.0;
   const double known = picture.known_sky.empty() ? 0 : picture.known_sky.at(x, y) / 255.0;
-  for (int j = 0; j < samples; ++j)
-    for (int i = 0; i < samples; ++i) {
-      const Eigen::Vector3d d = picture.rays.direction(x + (i + 0.5) / samples, y + (j + 0.5) / samples);
-      if (!sphere_->contains(last_facet_, d)) last_facet_ = sphere_->facet_at(d);
-      Sum& sum = picture_[last_facet_];
-      if (sum.weight == 0 && sum.clipped == 0) touched_.push_back(last_facet_);
-      sum.peak = std::max(sum.peak, light);
-      sum.bright += light * weight * d;
-      sum.known_sky += known * weight;
-      if (!picture.known_sky.empty()) sum.judged += weight;
-      sum.open += open * weight;
-      if (clipped) {
-        sum.clipped += weight;
-        sum.clipped_first += weight * rgb;
-        sum.clip = picture.clip;
-        continue;
-      }
-      sum.weight += weight;
-      sum.first += weight * rgb;
-      sum.second += weight * rgb.cwiseProduct(rgb);
-      sum.luminance_second += weight * light * light;
-      sum.pixels += 1.0 / (samples * samples);
+  for (const FacetPart& part : parts_.divide(corners)) {
+    const double weight = solid_angle * part.share;
+    Sum& sum = picture_[part.facet];
+    if (sum.weight == 0 && sum.clipped == 0) touched_.push_back(part.facet);
+    sum.peak = std::max(sum.peak, light);
+    sum.bright += light * weight * part.middle;
+    sum.known_sky += known * weight;
+    if (!picture.known_sky.empty()) sum.judged += weight;
+    sum.open += open * weight;
+    if (clipped) {
+      sum.clipped += weight;
+      sum.clipped_first += weight * rgb;
+      sum.clip = picture.clip;
+      continue;
     }
+    sum.weight += weight;
+    sum.first += weight * rgb;
+    sum.second += weight * rgb.cwiseProduct(rgb);
+    sum.luminance_second += weight * light * light;
+    sum.pixels += part.share;
+  }
 }
 
 void SphereLightSum::fold() {

@@ -4,12 +4,14 @@
 #include <memory>
 #include <vector>
 
+#include "roxel/sky/facet_parts.h"
 #include "roxel/sky/facet_sphere.h"
 #include "roxel/sky/sky_picture.h"
 
 namespace roxel {
 
-/// Pixels count by their solid angle. Clipped pixels are counted, but not in means and variances.
+/// Pixels count by their solid angle, on each facet by that of their part of it. Clipped pixels are counted,
+/// but not in means and variances.
 struct FacetLight {
   double weight = 0;   ///< steradians of usable pixels, of all pictures together
   double clipped = 0;  ///< steradians of clipped pixels
@@ -71,14 +73,15 @@ class SphereLightSum {
     double coverage = 0, between_weight = 0, between_first = 0, between_second = 0;
     int pictures = 0;
   };
-  void add_pixel(const SkyPicture& picture, int x, int y, int samples);
+  void add_pixel(const SkyPicture& picture, int x, int y, const std::array<Eigen::Vector3d, 4>& corners);
   void fold();
 
   std::shared_ptr<const FacetSphere> sphere_;
   std::vector<Sum> picture_;
   std::vector<int> touched_;
   std::vector<Total> total_;
-  int last_facet_ = 0, pictures_ = 0, masked_by_hand_ = 0;
+  FacetParts parts_;
+  int pictures_ = 0, masked_by_hand_ = 0;
 };
 
 }  // namespace roxel

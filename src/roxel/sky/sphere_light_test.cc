@@ -175,10 +175,76 @@ TEST(SphereLight, OfOneColourHasThatMeanAndNoVariance) {
 }
 
 TEST(SphereLight, FacetsInsideThePictureAreCoveredWhole) {
-  const SphereLight light = light_of({plain(1)});
-  const int inside =
-      light.sphere->facet_at(PixelRays(camera(), Eigen::Matrix3d::Identity()).direction(30, 20));
-  EXPECT_NEAR(light.facets[inside].coverage, 1, 0.05);
+  const PixelRays rays(camera(), Eigen::Matrix3d::Identity());
+  for (const int level : {2, 3, 5}) {  // of pixels that are small and large beside facets
+    const SphereLight light = light_of({plain(1)}, level);
+    int whole = 0, border = 0;
+    for (int f = 0; f < light.sphere->count(); ++f) {
+      const auto& corners = light.sphere->corners(f);
+      const auto in_view = std::count_if(corners.begin(), corners.end(), [&](const Eigen::Vector3d& corner) {
+        const auto at = rays.position(corner);
+        return at && at->x() > 0 && at->x() < 60 && at->y() > 0 && at->y() < 40;
+      });
+      if (in_view == 3) {
+        EXPECT_NEAR(light.facets[f].coverage, 1, 1e-9) << f;
+        ++whole;
+      } else if (in_view > 0) {
+        EXPECT_LT(light.facets[f].coverage, 1) << f;
+        ++border;
+      }
+    }
+    EXPECT_GE(whole, 2) << level;
+    EXPECT_GT(border, 4) << level;
+  }
+}
+
+TEST(FacetParts, OfAPatchAreWhatFinePointsOfItSay) {
+  const FacetSphere sphere(4);
+  FacetParts parts(sphere);
+  const PixelRays rays(camera(12, 8, 10), Eigen::Matrix3d::Identity());  // pixels of some facets each
+  for (int y = 0; y < 8; ++y)
+    for (int x = 0; x < 12; ++x) {
+      const auto& found = parts.divide({rays.direction(x, y), rays.direction(x + 1, y),
+                                        rays.direction(x + 1, y + 1), rays.direction(x, y + 1)});
+      std::vector<double> share(sphere.count());
+      double sum = 0;
+      for (const FacetPart& part : found) {
+        EXPECT_TRUE(sphere.contains(part.facet, part.middle));
+        EXPECT_EQ(share[part.facet], 0) << "twice";
+        share[part.facet] = part.share, sum += part.share;
+      }
+      EXPECT_NEAR(sum, 1, 1e-12);
+      // Points of equal area in the picture, each by its own solid angle.
+      constexpr int kFine = 60;
+      std::vector<double> points(sphere.count());
+      double all = 0;
+      for (int j = 0; j < kFine; ++j)
+        for (int i = 0; i < kFine; ++i) {
+          const double u = x + (i + 0.5) / kFine, v = y + (j + 0.5) / kFine;
+          const double weight = std::pow(1 + std::pow((u - 6) / 10, 2) + std::pow((v - 4) / 10, 2), -1.5);
+          points[sphere.facet_at(rays.direction(u, v))] += weight, all += weight;
+        }
+      for (int f = 0; f < sphere.count(); ++f) ASSERT_NEAR(share[f], points[f] / all, 0.01) << f;
+    }
+}
+
+TEST(FacetParts, OfAPatchThatTouchesEdgesAndCornersAreWhole) {
+  const FacetSphere sphere(2);
+  FacetParts parts(sphere);
+  const double s = std::sin(0.1), c = std::cos(0.1);
+  // Around the pole, where four facets meet, and with edges along theirs.
+  for (const std::array<Eigen::Vector3d, 4>& patch :
+       {std::array<Eigen::Vector3d, 4>{Eigen::Vector3d(s, 0, c), {0, s, c}, {-s, 0, c}, {0, -s, c}},
+        std::array<Eigen::Vector3d, 4>{
+            Eigen::Vector3d(0, 0, 1), {s, 0, c}, Eigen::Vector3d(s, s, c).normalized(), {0, s, c}}}) {
+    double sum = 0;
+    for (const FacetPart& part : parts.divide(patch)) sum += part.share;
+    EXPECT_NEAR(sum, 1, 1e-12);
+  }
+  EXPECT_EQ(parts.divide({Eigen::Vector3d(s, 0, c), {0, s, c}, {-s, 0, c}, {0, -s, c}}).size(), 4u);
+  const Eigen::Vector3d point = Eigen::Vector3d(1, 2, 3).normalized();
+  ASSERT_EQ(parts.divide({point, point, point, point}).size(), 1u);  // of no area
+  EXPECT_EQ(parts.divide({point, point, point, point})[0].share, 1);
 }
 
 TEST(SphereLight, AveragesPicturesAndReportsTheirDisagreement) {
