@@ -18,8 +18,7 @@ void keep_inside(const Eigen::Vector3d& normal, const std::vector<Eigen::Vector3
     const Eigen::Vector3d &from = polygon[i], &to = polygon[(i + 1) % polygon.size()];
     const double a = normal.dot(from), b = normal.dot(to);
     if (a >= 0) kept.push_back(from);
-    if ((a < 0) != (b < 0) && a != 0)
-      kept.push_back((std::abs(b) * from + std::abs(a) * to).normalized());
+    if ((a < 0) != (b < 0) && a != 0) kept.push_back((std::abs(b) * from + std::abs(a) * to).normalized());
   }
 }
 
