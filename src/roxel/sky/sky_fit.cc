@@ -26,7 +26,8 @@ constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 /// Clouds against walls, where a volume knows of neither: smooth, grey or blue, not much darker than the
 /// model.
 constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
-constexpr double kIslandOpen = 2.0 / 3;  ///< of the edge of a cloud that does not touch the sky of the fit
+constexpr double kIslandInSky = 0.2;  ///< of the edge of a cloud that does not touch the sky of the fit
+constexpr int kMostMixed = 4;         ///< facets beyond such an edge
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
 /// Contrast of a spot that is a sun without glare: lamps and white walls have less. Not where white is 1,
@@ -390,42 +391,74 @@ class Fitting {
            bright > kCloudDarkest;
   }
 
-  /// Clouds with sharp edges: what of the smooth regions that a volume does not explain may be cloud, where
-  /// it explains little of what is around, either. A wall that it does not know has walls around that it
-  /// does.
-  std::vector<int> islands() const {
-    std::vector<int> found;
+  /// Whether there is sky at most so many facets away.
+  bool near_sky(int f, int steps) const {
+    if (out_.used[f] || out_.beyond_model[f]) return true;
+    return steps > 0 &&
+           std::ranges::any_of(sphere_->neighbours(f), [&](int n) { return near_sky(n, steps - 1); });
+  }
+
+  /// Facets that a pixel at an edge reaches into, and the one that it is in.
+  int mixed_facets(int f) const {
+    const FacetLight& facet = out_.light.facets[f];
+    const double pixels = facet.pixels / facet.pictures;
+    return 1 + std::min(kMostMixed, static_cast<int>(std::ceil(1 / std::sqrt(std::max(pixels, 1e-3)))));
+  }
+
+  /// What of the smooth regions that a volume does not explain may be cloud.
+  std::vector<std::vector<int>> islands() const {
+    std::vector<std::vector<int>> found;
     const auto belongs = [&](int f) { return out_.masks.sky[f] && may_be_cloud(f); };
     std::vector<std::uint8_t> taken(out_.used.size());
     for (int seed = 0; seed < sphere_->count(); ++seed) {
       if (taken[seed] || !belongs(seed)) continue;
-      std::vector<int> island{seed};
       taken[seed] = 1;
-      double around = 0, open = 0;
+      std::vector<int>& island = found.emplace_back(1, seed);
       for (std::size_t i = 0; i < island.size(); ++i)
-        for (const int next : sphere_->neighbours(island[i])) {
-          if (!belongs(next))
-            ++around, open += is_open(out_.light.facets[next]);
-          else if (!taken[next])
-            taken[next] = 1, island.push_back(next);
-        }
-      if (open >= kIslandOpen * around) found.insert(found.end(), island.begin(), island.end());
+        for (const int next : sphere_->neighbours(island[i]))
+          if (!taken[next] && belongs(next)) taken[next] = 1, island.push_back(next);
     }
     return found;
+  }
+
+  /// Whether sky goes on beyond an island's edge; of walls that a volume lacks, walls do. Clouds are cut off
+  /// by roofs and by where pictures end.
+  bool is_in_sky(const std::vector<int>& island) const {
+    double edge = 0, in_sky = 0;
+    for (const int f : island)
+      for (const int next : sphere_->neighbours(f)) {
+        if (std::ranges::binary_search(island, next) || !(out_.light.facets[next].coverage > 0)) continue;
+        ++edge, in_sky += near_sky(next, mixed_facets(f));
+      }
+    return in_sky > kIslandInSky * edge;
+  }
+
+  /// Clouds with sharp edges, one after another, as they may hide what is between.
+  void take_islands() {
+    std::vector<std::vector<int>> left = islands();
+    for (std::vector<int>& island : left) std::ranges::sort(island);
+    for (std::size_t before = left.size() + 1; left.size() < before;) {
+      before = left.size();
+      std::erase_if(left, [&](const std::vector<int>& island) {
+        if (!is_in_sky(island)) return false;
+        for (const int f : island) out_.beyond_model[f] = 1;
+        return true;
+      });
+    }
   }
 
   void find_beyond_model() {
     out_.beyond_model.assign(out_.used.size(), 0);
     if (!sky().has_light() || out_.masks.by_hand) return;
+    take_islands();
     std::vector<int> queue;
     const auto spread = [&](int from) {
       for (const int next : sphere_->neighbours(from))
         if (!out_.beyond_model[next] && may_be_cloud(next))
           out_.beyond_model[next] = 1, queue.push_back(next);
     };
-    for (const int f : islands()) out_.beyond_model[f] = 1, queue.push_back(f);
     for (int f = 0; f < sphere_->count(); ++f)
-      if (out_.used[f]) spread(f);
+      if (out_.used[f] || out_.beyond_model[f]) spread(f);
     for (std::size_t i = 0; i < queue.size(); ++i) spread(queue[i]);
   }
 
