@@ -12,6 +12,7 @@
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
 #include "roxel/base/parallel.h"
+#include "roxel/dataset/scaled_photograph.h"
 #include "roxel/io/image_file.h"
 #include "roxel/io/sky_file.h"
 #include "roxel/report/pictures.h"
@@ -166,39 +167,60 @@ ReportView write_pictures(const fs::path& run, const SkyFit& fit) {
 /// Whether a fit says anything of where the sky is.
 bool tells_sky(const NodeSky& sky) { return sky.has_light() || sky.fallback == kClippedSky; }
 
+/// A view's mask as its picture was looked at, and what it takes to make it as large as the photograph.
+struct ViewMask {
+  Mask mask;  ///< empty where nothing says where the sky is
+  int scale = 1;
+};
+
 /// A mask by hand stands; the others come from the fit, and are empty where it says nothing.
-std::vector<Mask> make_masks(const SkyFit& fit, const SkyPictureSource& pictures) {
-  std::vector<Mask> masks;
+std::vector<ViewMask> make_masks(const SkyFit& fit, const SkyPictureSource& pictures) {
+  std::vector<ViewMask> masks;
   for (std::size_t i = 0; i < fit.sky.views.size(); ++i) {
     SkyPicture picture = pictures(static_cast<int>(i));
-    masks.push_back(!picture.known_sky.empty() ? std::move(picture.known_sky)
-                    : tells_sky(fit.sky)       ? soft_sky_mask(picture, fit)
-                                               : Mask());
+    masks.push_back({!picture.known_sky.empty() ? std::move(picture.known_sky)
+                     : tells_sky(fit.sky)       ? soft_sky_mask(picture, fit)
+                                                : Mask(),
+                     picture.scale});
   }
   return masks;
 }
 
-/// Share of the pixels that are 255.
-double mean_share(const std::vector<Mask>& masks) {
+/// Mean of all pixels.
+double mean_share(const std::vector<ViewMask>& masks) {
   double sum = 0, all = 0;
-  for (const Mask& mask : masks) {
-    for (const std::uint8_t value : mask.data()) sum += value / 255.0;
-    all += static_cast<double>(mask.data().size());
+  for (const ViewMask& view : masks) {
+    for (const std::uint8_t value : view.mask.data()) sum += value / 255.0;
+    all += static_cast<double>(view.mask.data().size());
   }
   return all > 0 ? sum / all : 0;
 }
 
-void write_masks(const fs::path& run, const SkyFit& fit, const std::vector<Mask>& masks) {
-  for (std::size_t i = 0; i < masks.size(); ++i)
-    if (!masks[i].empty()) write_png(sky_mask_path(run, fit.sky.views[i]).string(), masks[i]);
+void write_masks(const fs::path& run, const SkyInput& input, std::size_t task,
+                 const std::vector<ViewMask>& masks) {
+  const std::vector<std::string>& views = input.tasks[task].views;
+  for (std::size_t i = 0; i < masks.size(); ++i) {
+    if (masks[i].mask.empty()) continue;
+    const fs::path file = sky_mask_path(run, views[i]);
+    if (masks[i].scale == 1) {
+      write_png(file.string(), masks[i].mask);
+      continue;
+    }
+    const auto [width, height] = input.sizes[task][i];
+    const Mask by_hand = input.hand_masks[task](static_cast<int>(i));
+    write_png(file.string(),
+              by_hand.empty() ? enlarged(masks[i].mask, masks[i].scale, width, height) : by_hand);
+  }
 }
 
-NodeReport do_node(const SkyTask& task, const SkyPictureSource& pictures, const SkyCommandOptions& options,
+NodeReport do_node(const SkyInput& input, std::size_t n, const SkyCommandOptions& options,
                    const fs::path& run) {
+  const SkyTask& task = input.tasks[n];
+  const SkyPictureSource& pictures = input.pictures[n];
   const SkyFit fit = fit_sky(task, pictures, options.sky.fit_options());
   write_sky(run, fit.sky);
-  const std::vector<Mask> masks = make_masks(fit, pictures);
-  write_masks(run, fit, masks);
+  const std::vector<ViewMask> masks = make_masks(fit, pictures);
+  write_masks(run, input, n, masks);
   NodeReport report{node_json(fit, mean_share(masks)), node_line(fit), {}, {}};
   if (options.pictures) report.view = write_pictures(run, fit);
   for (const std::string& warning : fit.warnings) report.warnings.push_back(task.name + ": " + warning);
@@ -213,7 +235,7 @@ std::vector<NodeReport> do_nodes(const SkyInput& input, const SkyCommandOptions&
   parallel_for(static_cast<std::int64_t>(reports.size()), session.context().thread_count(),
                [&](std::int64_t n, int) {
                  session.context().throw_if_cancelled();
-                 reports[n] = do_node(input.tasks[n], input.pictures[n], options, run);
+                 reports[n] = do_node(input, static_cast<std::size_t>(n), options, run);
                  const std::lock_guard<std::mutex> lock(mutex);
                  Progress progress;
                  progress.stage = "sky";
@@ -324,12 +346,48 @@ SkyPictureSource with_open_rays(const SkyTask& task, const SkyPictureSource& pic
   };
 }
 
+/// What of the first masks' sky, in `run`, is sky in these.
+double share_kept(const fs::path& run, const std::vector<std::string>& views,
+                  const std::vector<ViewMask>& masks) {
+  double kept = 0, first = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const fs::path file = sky_mask_path(run, views[i]);
+    if (!fs::is_regular_file(file)) continue;
+    const Mask before = scaled(read_mask(file.string()), masks[i].scale);
+    for (std::size_t p = 0; p < before.data().size(); ++p) {
+      first += before.data()[p];
+      if (!masks[i].mask.empty()) kept += std::min(before.data()[p], masks[i].mask.data()[p]);
+    }
+  }
+  return first > 0 ? kept / first : 1;
+}
+
+/// How much a model can say: its place in the list of models.
+int rank_of(const std::string& model) {
+  for (const SkyModel known :
+       {SkyModel::kUniform, SkyModel::kPublished, SkyModel::kGradation, SkyModel::kPerez})
+    if (model == to_string(known)) return static_cast<int>(known);
+  return 0;
+}
+
+/// Why a second sky does not replace the first; empty where it does.
+std::string why_not(const SkyAgain& again, const NodeSky& sky, const std::string& model_before, double kept) {
+  constexpr double kMoreSky = 0.002;  // of a node's pixels: less is not worth another light
+  constexpr double kKept = 0.95, kWorse = 1.3;
+  if (!sky.has_light()) return "it has no light";
+  if (!(again.mask_share > again.mask_share_before + kMoreSky)) return "hardly more sky";
+  if (kept < kKept) return formatted("it has but %.0f %% of the sky of the first", 100 * kept);
+  if (static_cast<int>(sky.model) < rank_of(model_before))
+    return std::string("its model is but ") + to_string(sky.model);
+  if (again.error > kWorse * again.error_before && rank_of(model_before) > 0) return "its fit is worse";
+  return {};
+}
+
 }  // namespace
 
 std::vector<SkyAgain> fit_skies_again(const SkyInput& input, const SkyOptions& sky, const OpenRays& open,
                                       const fs::path& run, Session& session,
                                       std::vector<ordered_json>& nodes) {
-  constexpr double kMoreSky = 0.002;  ///< of a node's pixels: less is not worth another light
   const SkyFitOptions options = sky.fit_options();
   std::vector<SkyAgain> all(input.tasks.size());
   parallel_for(
@@ -337,17 +395,18 @@ std::vector<SkyAgain> fit_skies_again(const SkyInput& input, const SkyOptions& s
         session.context().throw_if_cancelled();
         const SkyPictureSource pictures = with_open_rays(input.tasks[n], input.pictures[n], open);
         const SkyFit fit = fit_sky(input.tasks[n], pictures, options);
-        const std::vector<Mask> masks = make_masks(fit, pictures);
-        std::vector<Mask> unexplained;
+        const std::vector<ViewMask> masks = make_masks(fit, pictures);
+        std::vector<ViewMask> unexplained;
         for (const std::string& view : input.tasks[n].views)
-          if (const auto found = open.find(view); found != open.end()) unexplained.push_back(found->second);
+          if (const auto found = open.find(view); found != open.end()) unexplained.push_back({found->second});
         all[n] = {input.tasks[n].name, mean_share(unexplained),           nodes[n].value("mask_share", 0.0),
                   mean_share(masks),   nodes[n].value("mean_error", 0.0), fit.sky.mean_error};
         SkyAgain& again = all[n];
-        again.taken = fit.sky.has_light() && again.mask_share > again.mask_share_before + kMoreSky;
-        if (!again.taken) return;
+        again.refused = why_not(again, fit.sky, nodes[n].value("model", ""),
+                                share_kept(run, input.tasks[n].views, masks));
+        if (!again.refused.empty()) return;
         write_sky(run, fit.sky);
-        write_masks(run, fit, masks);
+        write_masks(run, input, static_cast<std::size_t>(n), masks);
         write_pictures(run, fit);
         nodes[n] = node_json(fit, again.mask_share);
       });

@@ -28,7 +28,7 @@ OptionTable<StageSwitches> make_stage_table() {
       .unset("found from variance, colour and luminance");
   table.add("sky-again", &StageSwitches::sky_again)
       .help(
-          "After the first level, fit skies that this run fits again, with the rays that the volume leaves "
+          "After the first level, fit this run's skies a second time, with the rays that the volume leaves "
           "unexplained")
       .source("[Jethwa04] section 7.2.2");
   table.add("dry-run", &StageSwitches::dry_run)

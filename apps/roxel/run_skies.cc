@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "roxel/base/error.h"
+#include "roxel/io/sky_file.h"
 
 namespace roxel::cli {
 namespace {
@@ -37,11 +38,11 @@ bool RunSkies::find(const std::filesystem::path& results) {
   if (!fitted && !options_.stages.sky) return false;
   const std::filesystem::path skies = fitted ? results_ : std::filesystem::path(*options_.stages.sky);
   daylight_ = read_daylight(skies, input_.dataset);
-  if (daylight_->has_masks()) input_.load = with_sky_masks(input_.load, skies);
   if (fitted && options_.stages.sky_again && options_.reconstruct.levels > 1) {
     doubt_ = std::make_shared<std::atomic<bool>>(true);
-    input_.load = with_doubt(input_.load, up(), doubt_);
+    input_.load = with_doubt(input_.load, up(), names_of_fitted_masks(), doubt_);
   }
+  if (daylight_->has_masks()) input_.load = with_sky_masks(input_.load, skies);
   return fitted;
 }
 
@@ -94,6 +95,17 @@ Eigen::Vector3d RunSkies::up() const {
   return sky_input_->tasks.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ())
                                    : Eigen::Vector3d(sky_input_->tasks.front().sky_from_world.transpose() *
                                                      Eigen::Vector3d::UnitZ());
+}
+
+std::set<std::string> RunSkies::names_of_fitted_masks() const {
+  std::set<std::string> names;
+  for (std::size_t t = 0; t < sky_input_->tasks.size(); ++t)
+    for (std::size_t i = 0; i < sky_input_->tasks[t].views.size(); ++i)
+      if (sky_input_->hand_masks[t](static_cast<int>(i)).empty()) names.insert(sky_input_->tasks[t].views[i]);
+  std::erase_if(names, [&](const std::string& name) {
+    return !std::filesystem::is_regular_file(sky_mask_path(results_, name));
+  });
+  return names;
 }
 
 std::optional<Daylight> RunSkies::look_at_skies_again(const Volume& volume, const Scene& scene,

@@ -3,7 +3,9 @@
 #include <cmath>
 
 #include "roxel/base/parallel.h"
+#include "roxel/dataset/scaled_photograph.h"
 #include "roxel/march/render.h"
+#include "roxel/sky/sky_tasks.h"
 
 namespace roxel::cli {
 namespace {
@@ -25,7 +27,7 @@ OpenRays open_rays(const Volume& volume, const Dataset& dataset, const Scene& sc
   std::vector<Mask> masks(dataset.views.size());
   parallel_for(static_cast<std::int64_t>(masks.size()), context.thread_count(), [&](std::int64_t v, int) {
     context.throw_if_cancelled();
-    const PinholeCamera& camera = dataset.views[v].camera;
+    const PinholeCamera camera = scaled(dataset.views[v].camera, sky_scale(dataset.views[v].camera));
     const Rendering seen =
         render(stack, colors, camera, view_range(scene, dataset, static_cast<int>(v)), {}, RunContext(1));
     Mask open(camera.intrinsics.width, camera.intrinsics.height, 0);
@@ -39,15 +41,15 @@ OpenRays open_rays(const Volume& volume, const Dataset& dataset, const Scene& sc
   return open;
 }
 
-PhotographLoader with_doubt(PhotographLoader load, const Eigen::Vector3d& up,
+PhotographLoader with_doubt(PhotographLoader load, const Eigen::Vector3d& up, std::set<std::string> names,
                             std::shared_ptr<const std::atomic<bool>> doubt) {
-  return [load = std::move(load), up, doubt = std::move(doubt)](const View& view) {
+  return [load = std::move(load), up, names = std::move(names), doubt = std::move(doubt)](const View& view) {
     Photograph photo = load(view);
-    if (!*doubt || photo.foreground.empty()) return photo;
+    if (!*doubt || !photo.foreground.empty() || !names.contains(view.name)) return photo;
+    photo.foreground = Mask(photo.rgb.width(), photo.rgb.height());
     for (int y = 0; y < photo.rgb.height(); ++y)
       for (int x = 0; x < photo.rgb.width(); ++x)
-        if (photo.foreground.at(x, y) > kDoubt && rises(view.camera, up, x, y))
-          photo.foreground.at(x, y) = kDoubt;
+        if (rises(view.camera, up, x, y)) photo.foreground.at(x, y) = kDoubt;
     return photo;
   };
 }
@@ -59,7 +61,8 @@ nlohmann::ordered_json to_json(const SkyAgain& again) {
           {"mask_share", again.mask_share},
           {"mean_error_before", again.error_before},
           {"mean_error", again.error},
-          {"taken", again.taken}};
+          {"taken", again.refused.empty()},
+          {"refused", again.refused}};
 }
 
 }  // namespace roxel::cli

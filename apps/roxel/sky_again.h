@@ -5,6 +5,8 @@
 #include <atomic>
 #include <map>
 #include <memory>
+#include <set>
+#include <string>
 
 #include "roxel/solve/scene.h"
 #include "roxel/volume/volume.h"
@@ -18,10 +20,10 @@ using OpenRays = std::map<std::string, Mask>;
 OpenRays open_rays(const Volume& volume, const Dataset& dataset, const Scene& scene,
                    const Eigen::Vector3d& up, const RunContext& context);
 
-/// The loader, with what rises above the horizon as possibly, if hardly, background while `doubt` holds: a
-/// mask that lacks part of the sky must not force a volume to be built there. Photographs without a mask stay
-/// as they are.
-PhotographLoader with_doubt(PhotographLoader load, const Eigen::Vector3d& up,
+/// The loader, with what rises above the horizon as possibly, if hardly, background while `doubt` holds, in
+/// photographs of these names without a mask of the object: a sky mask that lacks part of the sky must not
+/// force a volume to be built there.
+PhotographLoader with_doubt(PhotographLoader load, const Eigen::Vector3d& up, std::set<std::string> names,
                             std::shared_ptr<const std::atomic<bool>> doubt);
 
 /// One node's sky before and after.
@@ -30,12 +32,12 @@ struct SkyAgain {
   double open_share = 0;                         ///< of the pixels: rays that the volume leaves unexplained
   double mask_share_before = 0, mask_share = 0;  ///< of the pixels that are sky
   double error_before = 0, error = 0;            ///< mean error of the fit
-  bool taken = false;                            ///< it found more sky, and replaces the one before
+  std::string refused = "not looked at";  ///< why the second does not replace the first; empty: it does
 };
 nlohmann::ordered_json to_json(const SkyAgain& again);
 
-/// Fits every sky again with open rays as evidence. Those that find more sky replace files in RUN/sky and
-/// entries of `nodes` (what fit_skies returned).
+/// Fits every sky again with open rays as evidence. Those that find more sky, lose none, and are fitted as
+/// well, replace files in RUN/sky and entries of `nodes` (what fit_skies returned).
 std::vector<SkyAgain> fit_skies_again(const SkyInput& input, const SkyOptions& options, const OpenRays& open,
                                       const std::filesystem::path& run, Session& session,
                                       std::vector<nlohmann::ordered_json>& nodes);

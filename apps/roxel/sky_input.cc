@@ -32,14 +32,15 @@ std::optional<fs::path> hand_mask(const std::optional<std::string>& folder, cons
   return std::nullopt;
 }
 
-Mask read_hand_mask(const std::optional<std::string>& folder, const std::string& name, const Image& picture) {
+Mask read_hand_mask(const std::optional<std::string>& folder, const std::string& name,
+                    std::pair<int, int> size) {
   const auto file = hand_mask(folder, name);
   if (!file) return {};
   Mask mask = read_mask(file->string());
-  if (mask.width() != picture.width() || mask.height() != picture.height())
-    throw_invalid(
-        file->string(), std::to_string(mask.width()) + " x " + std::to_string(mask.height()) + " pixels",
-        std::to_string(picture.width()) + " x " + std::to_string(picture.height()) + " as its image has");
+  if (std::pair(mask.width(), mask.height()) != size)
+    throw_invalid(file->string(),
+                  std::to_string(mask.width()) + " x " + std::to_string(mask.height()) + " pixels",
+                  std::to_string(size.first) + " x " + std::to_string(size.second) + " as its image has");
   return mask;
 }
 
@@ -68,7 +69,10 @@ SkyInput read_panorama(const std::string& path, const InputOptions& input, const
   task.views = {task.name};
   const Equirectangular frame{file.rgb.width(), file.rgb.height()};
   SkyPicture picture{std::move(file.rgb), std::move(file.valid), {}, PixelRays(frame)};
-  picture.known_sky = read_hand_mask(options.sky_masks, task.name, picture.rgb);
+  const std::pair size(picture.rgb.width(), picture.rgb.height());
+  picture.known_sky = read_hand_mask(options.sky_masks, task.name, size);
+  sky.sizes = {{size}};
+  sky.hand_masks.push_back([known = picture.known_sky](int) { return known; });
   picture.clip = clip_level(picture.rgb);
   sky.tasks.push_back(std::move(task));
   sky.pictures.push_back([picture](int) { return picture; });
@@ -90,13 +94,19 @@ SkyInput read_views(const std::string& path, const InputOptions& input, const Sk
   sky.warnings = std::move(skies.warnings);
   for (std::size_t t = 0; t < sky.tasks.size(); ++t) {
     std::vector<View> views;
-    for (const int v : skies.view_idxs[t]) views.push_back(dataset.views[v]);
-    sky.pictures.push_back([views, load = sky.input->load, folder = options.sky_masks,
-                            rotation = sky.tasks[t].sky_from_world](int i) {
-      Photograph photograph = load(views[i]);
-      Mask known = read_hand_mask(folder, views[i].name, photograph.rgb);
-      return sky_picture(views[i], std::move(photograph), rotation, std::move(known));
+    std::vector<std::pair<int, int>>& sizes = sky.sizes.emplace_back();
+    for (const int v : skies.view_idxs[t]) {
+      views.push_back(dataset.views[v]);
+      sizes.emplace_back(views.back().camera.intrinsics.width, views.back().camera.intrinsics.height);
+    }
+    const auto by_hand = sky.hand_masks.emplace_back([views, sizes, folder = options.sky_masks](int i) {
+      return read_hand_mask(folder, views[i].name, sizes[i]);
     });
+    sky.pictures.push_back(
+        [views, by_hand, load = sky.input->load, rotation = sky.tasks[t].sky_from_world](int i) {
+          Photograph photograph = load(views[i]);
+          return sky_picture(views[i], std::move(photograph), rotation, by_hand(i));
+        });
   }
   return sky;
 }

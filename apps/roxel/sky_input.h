@@ -2,7 +2,9 @@
 /// What `roxel sky` reads: a data set, or one panorama.
 
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common.h"
@@ -15,7 +17,10 @@ struct SkyInput {
   std::optional<Input> input;  ///< none for a panorama
   std::string path, format;
   std::vector<SkyTask> tasks;
-  std::vector<SkyPictureSource> pictures;    ///< of each task
+  std::vector<SkyPictureSource> pictures;  ///< of each task
+  /// Of each task's photographs, as large as they are: width and height, and the mask by hand or nothing.
+  std::vector<std::vector<std::pair<int, int>>> sizes;
+  std::vector<std::function<Mask(int)>> hand_masks;
   std::vector<std::string> notes, warnings;  ///< of what shares a sky; not the reader's own
 };
 

@@ -40,35 +40,6 @@ double voxel_in_pixels(const Image& depth, double focal_px, double voxel_size) {
   return z > 0 ? focal_px * voxel_size / z : 0;
 }
 
-PinholeCamera scaled(PinholeCamera camera, int scale) {
-  Intrinsics& k = camera.intrinsics;
-  k.width = std::max(1, k.width / scale);
-  k.height = std::max(1, k.height / scale);
-  for (double* length : {&k.fx, &k.fy, &k.cx, &k.cy}) *length /= scale;
-  return camera;
-}
-
-Photograph scaled(const Photograph& photo, int scale) {
-  if (scale == 1) return photo;
-  const int width = std::max(1, photo.rgb.width() / scale), height = std::max(1, photo.rgb.height() / scale);
-  const int channels = photo.rgb.channels();
-  Photograph out;
-  out.rgb = Image(width, height, channels);
-  if (!photo.valid.empty()) out.valid = Mask(width, height, 255);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      float* const mean = out.rgb.pixel(x, y);
-      int count = 0;
-      for (int v = y * scale; v < std::min((y + 1) * scale, photo.rgb.height()); ++v)
-        for (int u = x * scale; u < std::min((x + 1) * scale, photo.rgb.width()); ++u, ++count) {
-          for (int c = 0; c < channels; ++c) mean[c] += photo.rgb.pixel(u, v)[c];
-          if (!photo.valid.empty() && !photo.valid.at(u, v)) out.valid.at(x, y) = 0;
-        }
-      for (int c = 0; c < channels; ++c) mean[c] /= static_cast<float>(count);
-    }
-  return out;
-}
-
 std::vector<std::int64_t> surest_pixels(const Image& depth, const Image& variance, int scale) {
   const int width = std::max(1, depth.width() / scale), height = std::max(1, depth.height() / scale);
   std::vector<std::int64_t> surest;

@@ -2,7 +2,7 @@
 /// Views at a whole fraction of their size: refinement need not look closer than the volume is fine
 /// (docs/depth.md).
 
-#include "roxel/dataset/dataset.h"
+#include "roxel/dataset/scaled_photograph.h"
 #include "roxel/depth/depth_layers.h"
 #include "roxel/depth/pixel_plane.h"
 
@@ -19,13 +19,6 @@ std::vector<double> pixels_of_views(const Dataset& dataset);
 
 /// Pixels that a voxel is across at the median of the depths; 0 without depth.
 double voxel_in_pixels(const Image& depth, double focal_px, double voxel_size);
-
-/// A camera whose pixels are scale x scale of the other's; rows and columns left over are cut off.
-PinholeCamera scaled(PinholeCamera camera, int scale);
-
-/// Means over squares of pixels, valid where all of them are; the mask of the object is left out. At scale 1
-/// the photograph as it is.
-Photograph scaled(const Photograph& photo, int scale);
 
 /// What a pixel of the smaller view takes from the larger one's depth: the surest pixel of its square, -1
 /// where none has depth (> 0). Returns indices into the larger image, row by row.

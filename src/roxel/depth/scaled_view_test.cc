@@ -35,34 +35,6 @@ TEST(VoxelInPixels, IsThatOfTheMedianDepth) {
   EXPECT_NEAR(voxel_in_pixels(depth, 100, 0.1), 2, 1e-6);
 }
 
-TEST(ScaledCamera, PutsPointsAtTheSamePlaceOfTheImage) {
-  const PinholeCamera camera = SlantedPlane::camera(0.2, -0.1), half = scaled(camera, 2);
-  EXPECT_EQ(half.intrinsics.width, 36);
-  EXPECT_EQ(half.intrinsics.height, 28);
-  const Eigen::Vector3d x(0.3, 0.2, 4), large = camera.project(x), small = half.project(x);
-  EXPECT_NEAR(small.x(), large.x() / 2, 1e-12);
-  EXPECT_NEAR(small.y(), large.y() / 2, 1e-12);
-}
-
-TEST(ScaledPhotograph, HoldsMeansAndIsValidWhereAllOfASquareIs) {
-  Photograph photo;
-  photo.rgb = Image(5, 4, 3);
-  photo.valid = Mask(5, 4);
-  for (int y = 0; y < 4; ++y)
-    for (int x = 0; x < 5; ++x)
-      for (int c = 0; c < 3; ++c) photo.rgb.pixel(x, y)[c] = static_cast<float>(x + 10 * y + 100 * c);
-  photo.valid.at(3, 1) = 0;
-  const Photograph half = scaled(photo, 2);
-  ASSERT_EQ(half.rgb.width(), 2);  // what is left over is cut off
-  ASSERT_EQ(half.rgb.height(), 2);
-  for (int c = 0; c < 3; ++c) {
-    EXPECT_FLOAT_EQ(half.rgb.pixel(0, 0)[c], 5.5f + 100 * c);
-    EXPECT_FLOAT_EQ(half.rgb.pixel(1, 1)[c], 27.5f + 100 * c);
-  }
-  EXPECT_EQ(half.valid.at(0, 0), 255);
-  EXPECT_EQ(half.valid.at(1, 0), 0);
-}
-
 TEST(SurestPixels, HaveDepthAndTheLeastVariance) {
   Image depth(4, 2, 1, 2.0f), variance(4, 2, 1, 1.0f);
   *variance.pixel(1, 1) = 0.5f;

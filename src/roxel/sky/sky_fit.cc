@@ -26,8 +26,9 @@ constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 /// Clouds against walls, where a volume knows of neither: smooth, grey or blue, not much darker than the
 /// model.
 constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
-constexpr double kIslandInSky = 0.2;  ///< of the edge of a cloud that does not touch the sky of the fit
-constexpr int kMostMixed = 4;         ///< facets beyond such an edge
+constexpr double kIslandInSky = 0.5;  ///< of the edge of a cloud that does not touch the sky of the fit
+constexpr std::size_t kLeastIsland = 4;
+constexpr int kMostMixed = 4;  ///< facets beyond such an edge
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
 constexpr double kSunsDifferDeg = 2;
 /// Contrast of a spot that is a sun without glare: lamps and white walls have less. Not where white is 1,
@@ -308,9 +309,10 @@ class Fitting {
     };
     for (int f = 0; f < sphere_->count(); ++f)
       if (out_.used[f] && out_.masks.sky[f]) take(f);
-    for (const std::vector<int>& region : out_.masks.apart)
-      if (may_be_sky(region))
-        for (const int f : region) take(f);
+    for (const auto* regions : {&out_.masks.apart, &out_.masks.unexplained})
+      for (const std::vector<int>& region : *regions)
+        if (may_be_sky(region))
+          for (const int f : region) take(f);
     for (std::size_t i = 0; i < queue.size(); ++i)
       for (const int next : sphere_->neighbours(queue[i])) take(next);
     return agreeing;
@@ -408,8 +410,10 @@ class Fitting {
   /// What of the smooth regions that a volume does not explain may be cloud.
   std::vector<std::vector<int>> islands() const {
     std::vector<std::vector<int>> found;
-    const auto belongs = [&](int f) { return out_.masks.sky[f] && may_be_cloud(f); };
-    std::vector<std::uint8_t> taken(out_.used.size());
+    std::vector<std::uint8_t> may_be(out_.used.size()), taken(out_.used.size());
+    for (const std::vector<int>& region : out_.masks.unexplained)
+      for (const int f : region) may_be[f] = may_be_cloud(f);
+    const auto belongs = [&](int f) { return may_be[f] != 0; };
     for (int seed = 0; seed < sphere_->count(); ++seed) {
       if (taken[seed] || !belongs(seed)) continue;
       taken[seed] = 1;
@@ -417,6 +421,7 @@ class Fitting {
       for (std::size_t i = 0; i < island.size(); ++i)
         for (const int next : sphere_->neighbours(island[i]))
           if (!taken[next] && belongs(next)) taken[next] = 1, island.push_back(next);
+      if (island.size() < kLeastIsland) found.pop_back();
     }
     return found;
   }

@@ -287,9 +287,9 @@ SkyPicture with_sharp_clouds(Mask* surface) {
   picture.open = Mask(360, 180, 0);
   for (int y = 0; y < 180; ++y)
     for (int x = 0; x < 360; ++x) {
-      const bool sky = surface->at(x, y) < 128, hole = !sky && std::hypot(x % 60 - 30, y - 82) < 6;
+      const bool sky = surface->at(x, y) < 128, hole = !sky && std::hypot(x % 120 - 60, y - 82) < 6;
       if (sky || hole) picture.open.at(x, y) = 255;
-      if (hole || (sky && y > 12 && std::hypot(x % 60 - 30, y - 28) < 12))
+      if (hole || (sky && y > 12 && std::hypot(x % 120 - 60, y - 40) < 16))
         for (int c = 0; c < 3; ++c) picture.rgb.pixel(x, y)[c] = 0.5f;
     }
   return picture;

@@ -197,10 +197,7 @@ class Masking {
     for (const Region& region : regions_) {
       const bool blue = !out_.red_blue_used || region.blue >= kBorneOut * region.area;
       const bool bright = !out_.luminance_used || region.bright >= kBorneOut * region.area;
-      if (region.open >= kBorneOut * region.area) {  // nothing else is there
-        for (const int f : region.facets) out_.sky[f] = 1;
-        continue;
-      }
+      if (region.open >= kBorneOut * region.area) out_.unexplained.push_back(region.facets);
       // A region that is much smaller is a wall or a window until the fit says otherwise.
       if (!blue || !bright) continue;
       if (region.area > kSureShare * surest->area)

@@ -30,6 +30,7 @@ struct SkyMasks {
   std::vector<std::uint8_t> sky;  ///< 1 = sky, as far as all of this says
   std::vector<std::vector<int>>
       apart;  ///< smooth regions that pass the masks in use, but are too small to be sure
+  std::vector<std::vector<int>> unexplained;  ///< smooth regions where a volume knows of nothing
   /// Clipped facets that hang together, higher up than anything else: sky, brighter than the pictures can
   /// say.
   std::vector<int> white;

@@ -63,6 +63,7 @@ struct SkyPicture {
   PixelRays rays;
   Mask open = {};  ///< 255 where a volume lets the ray through: it knows of nothing there; empty = not known
   double clip = std::numeric_limits<double>::infinity();  ///< a channel of at least this is clipped
+  int scale = 1;  ///< pixels of the photograph that a pixel is across (sky_scale)
 };
 
 /// Where a picture clips: files whose values end at 1 do so just below 1; others where several pixels share

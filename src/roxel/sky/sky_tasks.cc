@@ -7,9 +7,11 @@
 #include <limits>
 #include <map>
 
+#include "roxel/base/angles.h"
 #include "roxel/base/error.h"
 #include "roxel/base/formatted.h"
 #include "roxel/base/median.h"
+#include "roxel/dataset/scaled_photograph.h"
 
 namespace roxel {
 namespace {
@@ -272,11 +274,42 @@ DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<do
   return skies;
 }
 
+int sky_scale(const PinholeCamera& camera) {
+  constexpr double kFinest = 0.05 * kDegree;
+  constexpr int kMost = 16;
+  const double pixel = PixelRays(camera, Eigen::Matrix3d::Identity()).pixel_angle();
+  return std::clamp(static_cast<int>(kFinest / pixel), 1, kMost);
+}
+
+namespace {
+
+/// Puts the brightest pixel of a square that clips in the place of its mean: means of what clips and what
+/// does not are neither.
+void keep_clipped(const Image& full, double clip, int scale, Image& small) {
+  for (int v = 0; v < small.height() * scale; ++v)
+    for (int u = 0; u < small.width() * scale; ++u) {
+      const float *rgb = full.pixel(u, v), most = std::max({rgb[0], rgb[1], rgb[2]});
+      float* const kept = small.pixel(u / scale, v / scale);
+      if (most >= clip && most > std::max({kept[0], kept[1], kept[2]})) std::copy_n(rgb, 3, kept);
+    }
+}
+
+}  // namespace
+
 SkyPicture sky_picture(const View& view, Photograph photograph, const Eigen::Matrix3d& sky_from_world,
                        Mask known_sky) {
+  const int scale = sky_scale(view.camera);
+  const double clip = clip_level(photograph.rgb);
+  if (scale > 1) {
+    Photograph small = scaled(photograph, scale);
+    keep_clipped(photograph.rgb, clip, scale, small.rgb);
+    photograph = std::move(small);
+    known_sky = scaled(known_sky, scale);
+  }
   SkyPicture picture{std::move(photograph.rgb), std::move(photograph.valid), std::move(known_sky),
-                     PixelRays(view.camera, sky_from_world)};
-  picture.clip = clip_level(picture.rgb);
+                     PixelRays(scaled(view.camera, scale), sky_from_world)};
+  picture.clip = clip;
+  picture.scale = scale;
   return picture;
 }
 

@@ -28,7 +28,12 @@ struct DatasetSkies {
 /// latitudes or longitudes, or cameras in two places that are farther apart than nodes are.
 DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<double, 3>>& up = std::nullopt);
 
-/// The view's pixels; `known_sky` (255 = sky) or nothing.
+/// By how much photographs are made smaller before anything is looked for in their sky: their pixels need not
+/// be finer than 0.05 degrees, a thirtieth of a facet. At most 16.
+int sky_scale(const PinholeCamera& camera);
+
+/// The view's pixels, made smaller by sky_scale; `known_sky` (255 = sky, as large as the photograph) or
+/// nothing. Where a pixel of the photograph clips, so does the one that holds it.
 SkyPicture sky_picture(const View& view, Photograph photograph, const Eigen::Matrix3d& sky_from_world,
                        Mask known_sky = {});
 

@@ -171,5 +171,37 @@ TEST(SkyTasks, UpByHandComesFirstAndPlacesMeanZ) {
   EXPECT_TRUE(sky_tasks(dataset(views)).tasks[0].sky_from_world.isIdentity());
 }
 
+TEST(SkyPictureOf, FinePixelsAreMadeSmallerAndClipWhereOneOfThemDoes) {
+  View fine = view("fine", {0, 0, 0});
+  fine.camera.intrinsics = {42, 30, 3600, 3600, 21, 15, 0};  // a pixel is 0.016 degrees
+  ASSERT_EQ(sky_scale(fine.camera), 3);
+  Photograph photo;
+  photo.rgb = Image(42, 30, 3, 0.5f);
+  photo.rgb.pixel(0, 0)[1] = 0.8f;
+  photo.rgb.pixel(10, 4)[2] = 1.0f;  // white is 1: it clips
+  photo.valid = Mask(42, 30, 255);
+  photo.valid.at(41, 29) = 0;
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const SkyPicture full_mask = sky_picture(fine, photo, turn, Mask(42, 30, 255));
+  EXPECT_EQ(full_mask.known_sky.width(), 14);
+  const SkyPicture picture = sky_picture(fine, photo, turn);
+  EXPECT_EQ(picture.scale, 3);
+  ASSERT_EQ(picture.rgb.width(), 14);
+  ASSERT_EQ(picture.rays.width(), 14);
+  ASSERT_EQ(picture.rays.height(), 10);
+  EXPECT_NEAR(picture.rgb.pixel(0, 0)[1], 0.5 + 0.3 / 9, 1e-6);
+  EXPECT_EQ(picture.rgb.pixel(3, 1)[2], 1.0f);
+  EXPECT_EQ(picture.rgb.pixel(3, 1)[0], 0.5f);
+  EXPECT_GE(picture.rgb.pixel(3, 1)[2], picture.clip);
+  EXPECT_EQ(picture.rgb.pixel(4, 1)[2], 0.5f);
+  EXPECT_EQ(picture.valid.at(13, 9), 0);
+  EXPECT_TRUE(picture.known_sky.empty());
+  const PixelRays rays(fine.camera, turn);
+  EXPECT_LT((picture.rays.direction(2, 5) - rays.direction(6, 15)).norm(), 1e-12);
+  fine.camera.intrinsics.fx = fine.camera.intrinsics.fy = 1000;  // 0.057 degrees
+  EXPECT_EQ(sky_picture(fine, photo, turn).scale, 1);
+  EXPECT_EQ(sky_picture(fine, photo, turn).rgb.data(), photo.rgb.data());
+}
+
 }  // namespace
 }  // namespace roxel

@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace roxel {
+namespace {
+
+constexpr double kPeakShare = 0.1;  ///< of a pixel: less of it in a facet says little of the facet's own peak
+
+}  // namespace
 
 SphereLightSum::SphereLightSum(std::shared_ptr<const FacetSphere> sphere)
     : sphere_(std::move(sphere)), picture_(sphere_->count()), total_(sphere_->count()), parts_(*sphere_) {}
@@ -38,7 +43,7 @@ void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y,
     const double weight = solid_angle * part.share;
     Sum& sum = picture_[part.facet];
     if (sum.weight == 0 && sum.clipped == 0) touched_.push_back(part.facet);
-    sum.peak = std::max(sum.peak, light);
+    if (part.share > kPeakShare) sum.peak = std::max(sum.peak, light);
     sum.bright += light * weight * part.middle;
     sum.known_sky += known * weight;
     if (!picture.known_sky.empty()) sum.judged += weight;
