@@ -232,7 +232,7 @@ class CourtyardSkies(Case):
 
 
 class Statue(Case):
-    """Internet photographs, of which every 8th is left out."""
+    """Internet photographs, of which every 8th is left out: one of eight parts that differ (docs/results/gain.md)."""
 
     @classmethod
     def setUpClass(cls):

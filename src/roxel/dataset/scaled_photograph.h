@@ -8,8 +8,8 @@ namespace roxel {
 /// A camera whose pixels are scale x scale of the other's; rows and columns left over are cut off.
 PinholeCamera scaled(PinholeCamera camera, int scale);
 
-/// Means over squares of pixels, valid where all of them are; masks of object and sky are left out. At scale 1
-/// the photograph as it is.
+/// Means over squares of pixels, valid where all of them are; masks of object and sky are left out. At scale
+/// 1 the photograph as it is.
 Photograph scaled(const Photograph& photo, int scale);
 
 /// Means over squares of pixels, rounded.
