@@ -232,8 +232,8 @@ std::vector<NodeReport> do_nodes(const SkyInput& input, const SkyCommandOptions&
   std::vector<NodeReport> reports(input.tasks.size());
   std::mutex mutex;
   std::size_t done = 0;
-  parallel_for(static_cast<std::int64_t>(reports.size()), session.context().thread_count(),
-               [&](std::int64_t n, int) {
+  parallel_for(static_cast<std::int64_t>(reports.size()),
+               sky_workers(input, session.context().thread_count()), [&](std::int64_t n, int) {
                  session.context().throw_if_cancelled();
                  reports[n] = do_node(input, static_cast<std::size_t>(n), options, run);
                  const std::lock_guard<std::mutex> lock(mutex);
@@ -391,7 +391,8 @@ std::vector<SkyAgain> fit_skies_again(const SkyInput& input, const SkyOptions& s
   const SkyFitOptions options = sky.fit_options();
   std::vector<SkyAgain> all(input.tasks.size());
   parallel_for(
-      static_cast<std::int64_t>(all.size()), session.context().thread_count(), [&](std::int64_t n, int) {
+      static_cast<std::int64_t>(all.size()), sky_workers(input, session.context().thread_count()),
+      [&](std::int64_t n, int) {
         session.context().throw_if_cancelled();
         const SkyPictureSource pictures = with_open_rays(input.tasks[n], input.pictures[n], open);
         const SkyFit fit = fit_sky(input.tasks[n], pictures, options);

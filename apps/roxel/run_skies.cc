@@ -73,6 +73,7 @@ SkyOptions RunSkies::sky_options() const {
 
 bool RunSkies::find_skies(bool wanted) {
   sky_input_ = read_sky_input(invocation_.inputs.front(), options_.input, sky_options(), session_);
+  if (const auto gib = options_.reconstruct.memory) sky_input_->most_bytes = *gib * 1024 * 1024 * 1024;
   for (const std::string& warning : sky_input_->warnings) input_.dataset.warnings.push_back(warning);
   skies_ = fit_skies(*sky_input_, sky_options(), results_, session_, input_.dataset.warnings);
   if (wanted) return true;

@@ -4,6 +4,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/io/image_file.h"
+#include "roxel/solve/memory_plan.h"
 
 namespace roxel::cli {
 namespace {
@@ -113,6 +114,14 @@ SkyInput read_views(const std::string& path, const InputOptions& input, const Sk
 
 }  // namespace
 
+int sky_workers(const SkyInput& input, int threads) {
+  std::int64_t largest = 1;
+  for (const auto& sizes : input.sizes)
+    for (const auto& [width, height] : sizes)
+      largest = std::max(largest, static_cast<std::int64_t>(width) * height);
+  return sky_workers(largest, input.most_bytes, threads);
+}
+
 SkyInput read_sky_input(const std::string& path, const InputOptions& input, const SkyOptions& options,
                         const Session& session) {
   if (options.sky_masks && !fs::is_directory(*options.sky_masks))
@@ -120,6 +129,7 @@ SkyInput read_sky_input(const std::string& path, const InputOptions& input, cons
   SkyInput sky =
       is_picture(path) ? read_panorama(path, input, options) : read_views(path, input, options, session);
   check_hand_masks(options, sky.tasks);
+  sky.most_bytes = memory_at_hand();
   return sky;
 }
 

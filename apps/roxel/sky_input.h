@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,7 +23,12 @@ struct SkyInput {
   std::vector<std::vector<std::pair<int, int>>> sizes;
   std::vector<std::function<Mask(int)>> hand_masks;
   std::vector<std::string> notes, warnings;  ///< of what shares a sky; not the reader's own
+  double most_bytes =
+      std::numeric_limits<double>::infinity();  ///< of memory for photographs looked at at once
 };
+
+/// Threads that look at photographs at once.
+int sky_workers(const SkyInput& input, int threads);
 
 /// Throws InvalidInput, also for masks by hand that no image has.
 SkyInput read_sky_input(const std::string& path, const InputOptions& input, const SkyOptions& options,

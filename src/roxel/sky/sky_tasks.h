@@ -2,6 +2,7 @@
 /// Which photographs share one sky, and what the data set knows of it.
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,10 @@ DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<do
 /// By how much photographs are made smaller before anything is looked for in their sky: their pixels need not
 /// be finer than 0.05 degrees, a thirtieth of a facet. At most 16.
 int sky_scale(const PinholeCamera& camera);
+
+/// Threads that look at photographs of up to so many pixels at once, each at one: as many as `most_bytes` of
+/// memory allow, at least one.
+int sky_workers(std::int64_t pixels, double most_bytes, int threads);
 
 /// The view's pixels, made smaller by sky_scale; `known_sky` (255 = sky, as large as the photograph) or
 /// nothing. Where a pixel of the photograph clips, so does the one that holds it.

@@ -203,5 +203,12 @@ TEST(SkyPictureOf, FinePixelsAreMadeSmallerAndClipWhereOneOfThemDoes) {
   EXPECT_EQ(sky_picture(fine, photo, turn).rgb.data(), photo.rgb.data());
 }
 
+TEST(SkyWorkers, AreAsManyAsMemoryAllows) {
+  EXPECT_EQ(sky_workers(24'000'000, 4e9, 16), 5);  // 0.77 GB each
+  EXPECT_EQ(sky_workers(24'000'000, 4e9, 2), 2);
+  EXPECT_EQ(sky_workers(24'000'000, 1e6, 2), 1);
+  EXPECT_EQ(sky_workers(1, std::numeric_limits<double>::infinity(), 8), 8);
+}
+
 }  // namespace
 }  // namespace roxel
