@@ -119,7 +119,7 @@ int sky_workers(const SkyInput& input, int threads) {
   for (const auto& sizes : input.sizes)
     for (const auto& [width, height] : sizes)
       largest = std::max(largest, static_cast<std::int64_t>(width) * height);
-  return sky_workers(largest, input.most_bytes, threads);
+  return roxel::sky_workers(largest, input.most_bytes, threads);
 }
 
 SkyInput read_sky_input(const std::string& path, const InputOptions& input, const SkyOptions& options,
