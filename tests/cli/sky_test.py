@@ -7,6 +7,7 @@
 import json
 import math
 import os
+import pathlib
 import re
 import struct
 import sys
@@ -219,6 +220,20 @@ class SkyInput(SkyCase):
         _, summary = self.sky("night", data=self.frames("night", night))
         self.assertEqual([(s["model"], s["fallback"], s["images"]) for s in summary["skies"]], [("none", "night", 4)])
         self.assertFalse([f for f in files_below(self.folder / "night") if f.startswith("sky/mask")])  # unknown, not "no sky"
+
+    def test_a_node_of_one_image_says_what_it_is_too_little_for(self):
+        street = self.folder / "street"
+        self.succeed("synth", "street", "-o", street, "--images", "28", "--size", "36x28", "--samples", "1", "--quiet")
+        names = [pathlib.Path(frame["file_path"]).stem for frame in json.loads((street / "transforms.json").read_text())["frames"]]
+        fallbacks = set()
+        for name in names[:8]:
+            _, summary = self.sky("one-image", "--images", f"*{name}*", "--facets", "4", "--no-pictures", data=street)
+            (node,) = summary["skies"]
+            self.assertEqual(node["images"], 1)
+            self.assertEqual(node["model"] == "perez", node["fallback"] == "")
+            self.assertLess(node["sky_share"], 0.4)
+            fallbacks.add((node["model"], node["fallback"]))
+        self.assertIn(("published", "little sky in view"), fallbacks)
 
     def test_what_the_reader_warns_of_is_said(self):
         def two_places(frames):  # of one node, nearer to each other than to the others
