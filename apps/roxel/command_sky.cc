@@ -18,6 +18,7 @@
 #include "roxel/report/pictures.h"
 #include "roxel/report/run_record.h"
 #include "roxel/report/sky_pictures.h"
+#include "roxel/sky/second_sky.h"
 #include "sky_again.h"
 #include "sky_stage.h"
 
@@ -346,41 +347,24 @@ SkyPictureSource with_open_rays(const SkyTask& task, const SkyPictureSource& pic
   };
 }
 
-/// What of the first masks' sky, in `run`, is sky in these.
-double share_kept(const fs::path& run, const std::vector<std::string>& views,
+/// Compares as large as masks are written.
+double share_kept(const fs::path& run, const SkyInput& input, std::size_t task,
                   const std::vector<ViewMask>& masks) {
-  double kept = 0, first = 0;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const fs::path file = sky_mask_path(run, views[i]);
+  SkyKept kept;
+  for (std::size_t i = 0; i < masks.size(); ++i) {
+    const fs::path file = sky_mask_path(run, input.tasks[task].views[i]);
     if (!fs::is_regular_file(file)) continue;
-    const Mask before = scaled(read_mask(file.string()), masks[i].scale);
-    for (std::size_t p = 0; p < before.data().size(); ++p) {
-      first += before.data()[p];
-      if (!masks[i].mask.empty()) kept += std::min(before.data()[p], masks[i].mask.data()[p]);
-    }
+    const auto [width, height] = input.sizes[task][i];
+    kept.add(read_mask(file.string()), enlarged(masks[i].mask, masks[i].scale, width, height));
   }
-  return first > 0 ? kept / first : 1;
+  return kept.share();
 }
 
-/// How much a model can say: its place in the list of models.
-int rank_of(const std::string& model) {
-  for (const SkyModel known :
+SkyModel model_named(const std::string& name) {
+  for (const SkyModel model :
        {SkyModel::kUniform, SkyModel::kPublished, SkyModel::kGradation, SkyModel::kPerez})
-    if (model == to_string(known)) return static_cast<int>(known);
-  return 0;
-}
-
-/// Why a second sky does not replace the first; empty where it does.
-std::string why_not(const SkyAgain& again, const NodeSky& sky, const std::string& model_before, double kept) {
-  constexpr double kMoreSky = 0.002;  // of a node's pixels: less is not worth another light
-  constexpr double kKept = 0.95, kWorse = 1.3;
-  if (!sky.has_light()) return "it has no light";
-  if (!(again.mask_share > again.mask_share_before + kMoreSky)) return "hardly more sky";
-  if (kept < kKept) return formatted("it has but %.0f %% of the sky of the first", 100 * kept);
-  if (static_cast<int>(sky.model) < rank_of(model_before))
-    return std::string("its model is but ") + to_string(sky.model);
-  if (again.error > kWorse * again.error_before && rank_of(model_before) > 0) return "its fit is worse";
-  return {};
+    if (name == to_string(model)) return model;
+  return SkyModel::kNone;
 }
 
 }  // namespace
@@ -403,8 +387,10 @@ std::vector<SkyAgain> fit_skies_again(const SkyInput& input, const SkyOptions& s
         all[n] = {input.tasks[n].name, mean_share(unexplained),           nodes[n].value("mask_share", 0.0),
                   mean_share(masks),   nodes[n].value("mean_error", 0.0), fit.sky.mean_error};
         SkyAgain& again = all[n];
-        again.refused = why_not(again, fit.sky, nodes[n].value("model", ""),
-                                share_kept(run, input.tasks[n].views, masks));
+        again.refused = why_refused(
+            {model_named(nodes[n].value("model", "")), again.mask_share_before, again.error_before},
+            {fit.sky.model, again.mask_share, again.error},
+            share_kept(run, input, static_cast<std::size_t>(n), masks));
         if (!again.refused.empty()) return;
         write_sky(run, fit.sky);
         write_masks(run, input, static_cast<std::size_t>(n), masks);

@@ -4,6 +4,7 @@
 
 #include "roxel/base/error.h"
 #include "roxel/io/sky_file.h"
+#include "run_input.h"
 
 namespace roxel::cli {
 namespace {
@@ -42,7 +43,7 @@ bool RunSkies::find(const std::filesystem::path& results) {
     doubt_ = std::make_shared<std::atomic<bool>>(true);
     input_.load = with_doubt(input_.load, up(), names_of_fitted_masks(), doubt_);
   }
-  if (daylight_->has_masks()) input_.load = with_sky_masks(input_.load, skies);
+  if (daylight_->has_masks() || doubt_) input_.load = with_sky_masks(input_.load, skies);
   return fitted;
 }
 
@@ -73,7 +74,7 @@ SkyOptions RunSkies::sky_options() const {
 
 bool RunSkies::find_skies(bool wanted) {
   sky_input_ = read_sky_input(invocation_.inputs.front(), options_.input, sky_options(), session_);
-  if (const auto gib = options_.reconstruct.memory) sky_input_->most_bytes = *gib * 1024 * 1024 * 1024;
+  sky_input_->most_bytes = static_cast<double>(bytes_left(options_.reconstruct.memory));
   for (const std::string& warning : sky_input_->warnings) input_.dataset.warnings.push_back(warning);
   skies_ = fit_skies(*sky_input_, sky_options(), results_, session_, input_.dataset.warnings);
   if (wanted) return true;
@@ -100,18 +101,22 @@ Eigen::Vector3d RunSkies::up() const {
 
 std::set<std::string> RunSkies::names_of_fitted_masks() const {
   std::set<std::string> names;
-  for (std::size_t t = 0; t < sky_input_->tasks.size(); ++t)
-    for (std::size_t i = 0; i < sky_input_->tasks[t].views.size(); ++i)
-      if (sky_input_->hand_masks[t](static_cast<int>(i)).empty()) names.insert(sky_input_->tasks[t].views[i]);
-  std::erase_if(names, [&](const std::string& name) {
-    return !std::filesystem::is_regular_file(sky_mask_path(results_, name));
-  });
+  for (std::size_t t = 0; t < sky_input_->tasks.size(); ++t) {
+    const std::vector<std::string>& views = sky_input_->tasks[t].views;
+    std::set<std::string> fitted;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      if (sky_input_->hand_masks[t](static_cast<int>(i)).empty() &&
+          std::filesystem::is_regular_file(sky_mask_path(results_, views[i])))
+        fitted.insert(views[i]);
+    if (fitted.size() == views.size()) names.merge(fitted);
+  }
   return names;
 }
 
 std::optional<Daylight> RunSkies::look_at_skies_again(const Volume& volume, const Scene& scene,
                                                       RunCheckpoints& checkpoints) {
   *doubt_ = false;
+  sky_input_->most_bytes = static_cast<double>(bytes_left(options_.reconstruct.memory));
   const OpenRays open = open_rays(volume, input_.dataset, scene, up(), session_.context());
   for (const SkyAgain& again : fit_skies_again(*sky_input_, sky_options(), open, results_, session_, skies_))
     skies_again_.push_back(to_json(again));

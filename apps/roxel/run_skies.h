@@ -34,7 +34,8 @@ class RunSkies {
   /// known; else nodes() says why not, and nothing is left of them below `results`.
   bool find_skies(bool wanted);
   Eigen::Vector3d up() const;
-  /// Of photographs whose sky mask comes from a fit, not by hand.
+  /// Of photographs whose sky mask comes from a fit; of nodes with a mask by hand, none, as those decide
+  /// alone.
   std::set<std::string> names_of_fitted_masks() const;
   /// Skies again, with what a first volume leaves unexplained. From here on masks are not doubted.
   std::optional<Daylight> look_at_skies_again(const Volume& volume, const Scene& scene,

@@ -249,6 +249,69 @@ class SkyInput(SkyCase):
         for warning in warnings: self.assertIn(warning, done.stderr)
 
 
+def write_grey_png(path, width, rows):
+    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, len(rows), 8, 0, 0, 0, 0)) +
+                     chunk(b"IDAT", zlib.compress(b"".join(b"\0" + bytes(row) for row in rows))) + chunk(b"IEND", b""))
+
+
+def read_grey_png(path):
+    """Width and rows of an 8-bit grey PNG."""
+    data, at, packed = path.read_bytes(), 8, b""
+    while at < len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        if kind == b"IHDR": width, = struct.unpack_from(">I", data, at + 8)
+        if kind == b"IDAT": packed += data[at + 8:at + 8 + size]
+        at += size + 12
+    raw, rows, above = zlib.decompress(packed), [], bytes(width)
+    for start in range(0, len(raw), width + 1):
+        line = bytearray(raw[start + 1:start + 1 + width])
+        for x in range(width):
+            left, up, corner = (line[x - 1], above[x], above[x - 1]) if x else (0, above[x], 0)
+            nearest = min((left, up, corner), key=lambda value: abs(left + up - corner - value))
+            line[x] = (line[x] + (0, left, up, (left + up) // 2, nearest)[raw[start]]) & 255
+        rows.append(bytes(line))
+        above = rows[-1]
+    return width, rows
+
+
+class LargePhotographs(SkyCase):
+    """Of pixels so fine that they are looked at smaller, by three; neither side is a multiple of that."""
+
+    WIDTH, HEIGHT, COUNT = 301, 203, 8
+
+    def is_sky(self, x, y): return y < 150 + (x % 60) // 10
+
+    def telephoto(self):
+        """Photographs side by side, each of 5 x 3 degrees, 20 degrees up."""
+        folder, lift, low = self.folder / "telephoto", math.sin(math.radians(20)), math.cos(math.radians(20))
+        folder.mkdir()
+        pixels = b"".join(rgbe([0.1, 0.13, 0.2] if self.is_sky(x, y) else [0.03 * (1 + (x * 7 + y * 13) % 5)] * 3)
+                          for y in range(self.HEIGHT) for x in range(self.WIDTH))
+        frames = []
+        for n in range(self.COUNT):
+            name, east, north = f"v{n}.hdr", math.sin(math.radians(5 * n)), math.cos(math.radians(5 * n))
+            (folder / name).write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (self.HEIGHT, self.WIDTH) + pixels)
+            right, up, back = (north, -east, 0), (-east * lift, -north * lift, low), (-east * low, -north * low, -lift)
+            frames.append({"file_path": name, "transform_matrix": [[*axes, 0] for axes in zip(right, up, back)] + [[0, 0, 0, 1]]})
+        (folder / "transforms.json").write_text(json.dumps({"fl_x": 3450, "fl_y": 3450, "w": self.WIDTH, "h": self.HEIGHT,
+                                                            "cx": self.WIDTH / 2, "cy": self.HEIGHT / 2, "frames": frames}))
+        return folder
+
+    def test_masks_are_as_large_as_photographs_and_those_by_hand_as_they_are(self):
+        data, masks = self.telephoto(), self.folder / "by-hand"
+        out, _ = self.sky("found", "--up", "0,0,1", "--no-pictures", data=data)
+        width, found = read_grey_png(out / "sky/mask/v3.png")
+        self.assertEqual((width, len(found)), (self.WIDTH, self.HEIGHT))
+        wrong = sum((found[y][x] >= 128) != self.is_sky(x, y) for y in range(self.HEIGHT) for x in range(self.WIDTH))
+        self.assertLess(wrong, 0.02 * self.WIDTH * self.HEIGHT)
+        masks.mkdir()
+        by_hand = [bytes(255 if self.is_sky(x, y) else 0 for x in range(self.WIDTH)) for y in range(self.HEIGHT)]
+        write_grey_png(masks / "v3.png", self.WIDTH, by_hand)
+        out, _ = self.sky("told", "--up", "0,0,1", "--sky-masks", masks, "--no-pictures", data=data)
+        self.assertEqual(read_grey_png(out / "sky/mask/v3.png"), (self.WIDTH, by_hand))
+
+
 class SkySun(SkyCase):
     def test_a_sun_is_measured_at_the_seam_and_near_the_zenith(self):
         for azimuth, elevation in ((180, 40), (179, 40), (150, 85)):
@@ -356,7 +419,7 @@ def read_exr(path):
     return rows
 
 
-def clouded_street(street, folder, node=0, towards=(300, 62), radius_deg=15, color=(0.35, 0.36, 0.38)):
+def clouded_street(street, folder, node=0, towards=(300, 50), radius_deg=22, color=(0.35, 0.36, 0.38)):
     """The street under one white cloud over one node; and the cloud's pixels (x, y) by view."""
     folder.mkdir()
     azimuth, elevation = map(math.radians, towards)
@@ -490,8 +553,8 @@ class LightInReconstruct(SkyCase):
         self.assertEqual([node["node"] for node in looked["skies_again"]], [node["node"] for node in looked["skies"]])
         for node in looked["skies_again"]:
             self.assertGreater(node["unexplained_share"], 0)
-            self.assertEqual(node["taken"], node["refused"] == "")
-            if node["taken"]: self.assertGreater(node["mask_share"], node["mask_share_before"] + 0.002)
+            self.assertIs(node["taken"], False)  # nothing is wrong with the first
+            self.assertEqual(node["refused"], "hardly more sky")
 
     def test_a_second_look_loses_no_sky(self):
         """Nothing hides the sky of this street but walls, of which its coarse first levels explain few."""
@@ -503,7 +566,7 @@ class LightInReconstruct(SkyCase):
             for node, (before, after) in enumerate(zip(*shares)):
                 with self.subTest(levels=levels, node=node):
                     self.assertEqual(before[0], after[0])
-                    self.assertLess(abs(after[1] - before[1]), 0.01)
+                    self.assertLess(abs(after[1] / before[1] - 1), 0.02)
                     for a, b in zip(before[2], after[2]): self.assertLess(abs(b / a - 1), 0.02)
 
     def test_a_cloud_that_the_first_fit_lacks_is_sky_after_the_second(self):
@@ -525,6 +588,13 @@ class LightInReconstruct(SkyCase):
         again = found["second"][2]["skies_again"][0]
         self.assertEqual((again["node"], again["taken"]), ("n00", True))
         self.assertEqual((again["mask_share_before"], again["mask_share"]), (found["first"][0], found["second"][0]))
+
+    def test_masks_by_hand_are_not_doubted(self):
+        for name, masks in (("found", []), ("by hand", ["--sky-masks", self.skies / "sky/mask"])):
+            with self.subTest(name):
+                one, two = (digest(self.reconstruct(f"doubt{number}", "--levels", "2", "--illumination", "sky", *masks, *options)[0] / "voxels.ply")
+                            for number, options in enumerate((["--no-sky-again"], [])))
+                self.assertEqual(one == two, name == "by hand")
 
     def test_a_second_fit_that_cannot_be_is_named(self):
         for why, options in (("taken from --sky RUN", ["--sky", self.skies]), ("no skies are fitted", ["--illumination", "none", *NO_SURROUND]),

@@ -26,7 +26,7 @@ constexpr double kApartBrightness = 0.5, kApartColor = 0.25;
 /// Clouds against walls, where a volume knows of neither: smooth, grey or blue, not much darker than the
 /// model.
 constexpr double kCloudContrast = 0.5, kCloudRedBlue = 1.15, kCloudDarkest = 0.5;
-constexpr double kIslandInSky = 0.5;  ///< of the edge of a cloud that does not touch the sky of the fit
+constexpr double kIslandInSky = 0.3;  ///< of the edge of a cloud that does not touch the sky of the fit
 constexpr std::size_t kLeastIsland = 4;
 constexpr int kMostMixed = 4;  ///< facets beyond such an edge
 constexpr double kLeastSigma = 0.01, kMostSigma = 0.15;
@@ -426,8 +426,8 @@ class Fitting {
     return found;
   }
 
-  /// Whether sky goes on beyond an island's edge; of walls that a volume lacks, walls do. Clouds are cut off
-  /// by roofs and by where pictures end.
+  /// Whether sky goes on beyond three tenths of an island's edge, as far as pictures show it. Walls that a
+  /// volume lacks may have sky above them, but walls to the sides and below; clouds may be cut off by roofs.
   bool is_in_sky(const std::vector<int>& island) const {
     double edge = 0, in_sky = 0;
     for (const int f : island)

@@ -292,8 +292,8 @@ namespace {
 /// Puts the brightest pixel of a square that clips in the place of its mean: means of what clips and what
 /// does not are neither.
 void keep_clipped(const Image& full, double clip, int scale, Image& small) {
-  for (int v = 0; v < small.height() * scale; ++v)
-    for (int u = 0; u < small.width() * scale; ++u) {
+  for (int v = 0; v < std::min(small.height() * scale, full.height()); ++v)
+    for (int u = 0; u < std::min(small.width() * scale, full.width()); ++u) {
       const float *rgb = full.pixel(u, v), most = std::max({rgb[0], rgb[1], rgb[2]});
       float* const kept = small.pixel(u / scale, v / scale);
       if (most >= clip && most > std::max({kept[0], kept[1], kept[2]})) std::copy_n(rgb, 3, kept);

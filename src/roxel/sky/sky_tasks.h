@@ -29,8 +29,8 @@ struct DatasetSkies {
 /// latitudes or longitudes, or cameras in two places that are farther apart than nodes are.
 DatasetSkies sky_tasks(const Dataset& dataset, const std::optional<std::array<double, 3>>& up = std::nullopt);
 
-/// By how much photographs are made smaller before anything is looked for in their sky: their pixels need not
-/// be finer than 0.05 degrees, a thirtieth of a facet. At most 16.
+/// By how much photographs are made smaller before anything is looked for in their sky: to pixels of at most
+/// 0.05 degrees, a thirtieth of a facet. At most 16.
 int sky_scale(const PinholeCamera& camera);
 
 /// Threads that look at photographs of up to so many pixels at once, each at one: as many as `most_bytes` of

@@ -203,6 +203,19 @@ TEST(SkyPictureOf, FinePixelsAreMadeSmallerAndClipWhereOneOfThemDoes) {
   EXPECT_EQ(sky_picture(fine, photo, turn).rgb.data(), photo.rgb.data());
 }
 
+TEST(SkyPictureOf, APhotographLowerThanASquareIsOnePixelHigh) {
+  View fine = view("fine", {0, 0, 0});
+  fine.camera.intrinsics = {42, 2, 3600, 3600, 21, 1, 0};
+  Photograph photo;
+  photo.rgb = Image(42, 2, 3, 0.5f);
+  photo.rgb.pixel(41, 1)[2] = 1.0f;
+  const SkyPicture picture = sky_picture(fine, photo, Eigen::Matrix3d::Identity());
+  ASSERT_EQ(picture.rgb.height(), 1);
+  ASSERT_EQ(picture.rgb.width(), 14);
+  EXPECT_EQ(picture.rgb.pixel(13, 0)[2], 1.0f);
+  EXPECT_FLOAT_EQ(picture.rgb.pixel(12, 0)[2], 0.5f);
+}
+
 TEST(SkyWorkers, AreAsManyAsMemoryAllows) {
   EXPECT_EQ(sky_workers(24'000'000, 4e9, 16), 5);  // 0.77 GB each
   EXPECT_EQ(sky_workers(24'000'000, 4e9, 2), 2);
