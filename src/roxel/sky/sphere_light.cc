@@ -6,7 +6,7 @@
 namespace roxel {
 namespace {
 
-constexpr double kPeakShare = 0.1;  ///< of a pixel: less of it in a facet says little of the facet's own peak
+constexpr double kPeakShare = 0.1;  ///< of a pixel or a facet: less that both share says little of either
 
 }  // namespace
 
@@ -43,7 +43,8 @@ void SphereLightSum::add_pixel(const SkyPicture& picture, int x, int y,
     const double weight = solid_angle * part.share;
     Sum& sum = picture_[part.facet];
     if (sum.weight == 0 && sum.clipped == 0) touched_.push_back(part.facet);
-    if (part.share > kPeakShare) sum.peak = std::max(sum.peak, light);
+    if (weight > kPeakShare * std::min(solid_angle, sphere_->solid_angle(part.facet)))
+      sum.peak = std::max(sum.peak, light);
     sum.bright += light * weight * part.middle;
     sum.known_sky += known * weight;
     if (!picture.known_sky.empty()) sum.judged += weight;

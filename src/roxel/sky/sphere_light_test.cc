@@ -274,6 +274,24 @@ TEST(SphereLight, AveragesPicturesAndReportsTheirDisagreement) {
   EXPECT_NEAR(light.facets[inside].variance[0], 1, 1e-9);
 }
 
+TEST(SphereLight, HasThePeakOfAPixelThatIsMuchLargerThanFacets) {
+  SkyPicture picture{Image(12, 8, 3, 1), {}, {}, PixelRays(camera(12, 8, 10), Eigen::Matrix3d::Identity())};
+  for (int c = 0; c < 3; ++c) picture.rgb.pixel(6, 4)[c] = 50;
+  const SphereLight light = light_of({picture}, 7);
+  int inside = 0, touching = 0;
+  for (const FacetLight& facet : light.facets) {
+    if (facet.mean[1] > 49.9) {
+      EXPECT_NEAR(facet.peak, 50, 1e-4);
+      ++inside;
+    } else if (facet.mean[1] > 1.001 && facet.mean[1] < 4) {  // of a fourteenth of it
+      EXPECT_NEAR(facet.peak, 1, 1e-4);
+      ++touching;
+    }
+  }
+  EXPECT_GT(inside, 10);
+  EXPECT_GT(touching, 0);
+}
+
 TEST(SphereLight, CountsAPixelOnceHoweverFineFacetsAre) {
   for (const int level : {2, 5}) {
     double pixels = 0;
